@@ -1,0 +1,19 @@
+#include <nanobind/nanobind.h>
+
+#include "linkwise/base/error.hpp"
+
+namespace nb = nanobind;
+
+NB_MODULE(LINKWISE_MODULE_NAME, m) {
+  // Classes say that they live in linkwise._core, which re-exports this module: a pickled model must
+  // open on a machine that picks another CPU target.
+  const nb::object module_name = m.attr("__name__");
+  m.attr("__name__") = "linkwise._core";
+
+  m.attr("cpu_target") = LINKWISE_CPU_TARGET;
+  m.attr("lanes") = LINKWISE_LANES;
+  nb::exception<linkwise::InputError>(m, "InputError", PyExc_ValueError).attr("__module__") =
+      "linkwise";
+
+  m.attr("__name__") = module_name;
+}

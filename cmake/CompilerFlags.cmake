@@ -1,0 +1,40 @@
+# Flags of linkwise's own code, carried by the interface target linkwise_flags.
+#
+# -ffast-math is never used: results must not depend on it, and checks for non-finite numbers must
+# survive. The three flags below give its speed where it matters: fused multiply-add, and no errno
+# or trap bookkeeping around square roots and selects.
+
+include(CheckCXXCompilerFlag)
+
+add_library(linkwise_flags INTERFACE)
+target_include_directories(linkwise_flags INTERFACE ${PROJECT_SOURCE_DIR}/src)
+target_link_libraries(linkwise_flags INTERFACE Threads::Threads)
+target_compile_definitions(
+  linkwise_flags
+  INTERFACE LINKWISE_VERSION="${PROJECT_VERSION}"
+            LINKWISE_ASSERTIONS=$<BOOL:${LINKWISE_ASSERTIONS}>
+            $<$<BOOL:${LINKWISE_ASSERTIONS}>:_GLIBCXX_ASSERTIONS>)
+target_compile_options(
+  linkwise_flags
+  INTERFACE -Wall -Wextra -Wshadow -Wno-psabi $<$<BOOL:${LINKWISE_WERROR}>:-Werror>
+            -ffp-contract=fast -fno-math-errno -fno-trapping-math)
+
+if(LINKWISE_SANITIZE)
+  target_compile_options(
+    linkwise_flags INTERFACE -O1 -g1 -fno-omit-frame-pointer -fsanitize=${LINKWISE_SANITIZE}
+                             -fno-sanitize-recover=all)
+  target_link_options(linkwise_flags INTERFACE -fsanitize=${LINKWISE_SANITIZE})
+else()
+  target_compile_options(linkwise_flags INTERFACE $<$<NOT:$<CONFIG:Debug>>:-O3>)
+  # The kernels are small constant-size blocks: they are fast when their loops are unrolled in full
+  # and slow when the superword vectoriser then packs the scalars of one block into a register (a
+  # factor of two on GCC 12). Vectors come from independent lanes instead, see simd/.
+  foreach(flag IN ITEMS "-fno-tree-slp-vectorize" "--param=max-completely-peeled-insns=4000"
+                        "--param=max-completely-peel-times=40")
+    string(MAKE_C_IDENTIFIER "LINKWISE_HAS${flag}" has_flag)
+    check_cxx_compiler_flag(${flag} ${has_flag})
+    if(${has_flag})
+      target_compile_options(linkwise_flags INTERFACE $<$<NOT:$<CONFIG:Debug>>:${flag}>)
+    endif()
+  endforeach()
+endif()
