@@ -1,0 +1,32 @@
+#pragma once
+// The table of linear solvers. One line of it gives a solver its place in C++, Python, the command
+// line, the documentation, the contract tests and the benchmarks.
+
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "linkwise/solve/solver.hpp"
+
+namespace linkwise {
+
+enum class SolverKind { direct, iterative };
+
+std::string_view to_string(SolverKind kind);
+
+struct SolverEntry {
+  std::string_view name;
+  std::string_view description;
+  SolverKind kind;
+  bool parallel;               ///< can all nodes work at once, up to sums and short recursions?
+  std::string_view reference;  ///< key in references.bib
+  std::unique_ptr<LinearSolver> (*make)(const SolverOptions&);
+};
+
+std::span<const SolverEntry> solver_table();
+/// InputError, listing the known names, when the name is unknown.
+const SolverEntry& find_solver(std::string_view name);
+/// Checks the name and the options.
+std::unique_ptr<LinearSolver> make_solver(std::string_view name, const SolverOptions& options = {});
+
+}  // namespace linkwise

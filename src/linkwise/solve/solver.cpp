@@ -1,0 +1,163 @@
+#include "linkwise/solve/solver.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "linkwise/base/error.hpp"
+
+namespace linkwise {
+namespace {
+
+template <class Enum, std::size_t count>
+using NameTable = std::array<std::pair<Enum, std::string_view>, count>;
+
+constexpr NameTable<StopRule, 3> stop_rules{{{StopRule::paper, "paper"},
+                                             {StopRule::residual, "residual"},
+                                             {StopRule::energy_norm, "energy_norm"}}};
+
+constexpr NameTable<ConjugateGradientForm, 2> forms{
+    {{ConjugateGradientForm::two_term, "two_term"},
+     {ConjugateGradientForm::three_term, "three_term"}}};
+
+constexpr NameTable<RelaxationChoice, 3> relaxations{{{RelaxationChoice::optimal, "optimal"},
+                                                      {RelaxationChoice::given, "given"},
+                                                      {RelaxationChoice::adaptive, "adaptive"}}};
+
+template <class Enum, std::size_t count>
+Enum from_name(const NameTable<Enum, count>& table, std::string_view what, std::string_view name) {
+  for (const auto& [value, known] : table)
+    if (known == name) return value;
+  std::string text = "unknown " + std::string(what) + " '" + std::string(name) + "'; known are";
+  for (std::size_t i = 0; i < count; ++i) text += (i ? ", " : " ") + std::string(table[i].second);
+  throw InputError(text);
+}
+
+template <class Enum, std::size_t count>
+std::string_view to_name(const NameTable<Enum, count>& table, Enum value) {
+  for (const auto& [known, name] : table)
+    if (known == value) return name;
+  return "?";
+}
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
+}  // namespace
+
+std::string_view to_string(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::converged:
+      return "converged";
+    case Outcome::reached_max_iterations:
+      return "reached_max_iterations";
+    case Outcome::not_positive_definite:
+      return "not_positive_definite";
+    case Outcome::not_finite:
+      return "not_finite";
+    case Outcome::stagnated:
+      return "stagnated";
+  }
+  return "?";
+}
+
+std::string_view message(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::converged:
+      return "the solution meets the tolerance";
+    case Outcome::reached_max_iterations:
+      return "the iteration limit was reached before the tolerance was met";
+    case Outcome::not_positive_definite:
+      return "the matrix is not positive definite";
+    case Outcome::not_finite:
+      return "a number in the system or in the iteration is not finite";
+    case Outcome::stagnated:
+      return "rounding errors keep the iteration from meeting the tolerance";
+  }
+  return "?";
+}
+
+std::string_view remedy(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::converged:
+      return "";
+    case Outcome::reached_max_iterations:
+      return "use solver 'thomas' or 'two_level', allow more iterations, or loosen the tolerance";
+    case Outcome::not_positive_definite:
+      return "check the inertias: each must be positive definite, and joints must not constrain "
+             "the "
+             "same direction twice";
+    case Outcome::not_finite:
+      return "check masses, inertias, drives and the state for values that are not finite or far "
+             "too large";
+    case Outcome::stagnated:
+      return "loosen the tolerance, use solver 'thomas' with refinement, or use the "
+             "articulated_body method, which loses no digits on long straight chains";
+  }
+  return "";
+}
+
+std::string_view to_string(StopRule rule) { return to_name(stop_rules, rule); }
+StopRule stop_rule_from_name(std::string_view name) {
+  return from_name(stop_rules, "stop rule", name);
+}
+std::string_view to_string(ConjugateGradientForm form) { return to_name(forms, form); }
+ConjugateGradientForm conjugate_gradient_form_from_name(std::string_view name) {
+  return from_name(forms, "form of conjugate gradients", name);
+}
+std::string_view to_string(RelaxationChoice choice) { return to_name(relaxations, choice); }
+RelaxationChoice relaxation_choice_from_name(std::string_view name) {
+  return from_name(relaxations, "choice of the relaxation factor", name);
+}
+
+void validate(const SolverOptions& o) {
+  const auto reject = [](const std::string& text) { throw InputError("solver options: " + text); };
+  if (!(o.tolerance > 0.0) || !std::isfinite(o.tolerance))
+    reject("tolerance is " + number(o.tolerance) + "; give a number above 0");
+  if (!(o.absolute_tolerance >= 0.0) || !std::isfinite(o.absolute_tolerance))
+    reject("absolute_tolerance is " + number(o.absolute_tolerance) + "; give 0 or more");
+  if (o.max_iterations < 0)
+    reject("max_iterations is " + std::to_string(o.max_iterations) +
+           "; give 1 or more, or 0 for the solver's own limit");
+  if (!(o.omega > 0.0 && o.omega < 2.0))
+    reject("omega is " + number(o.omega) + "; over-relaxation converges for 0 < omega < 2 only");
+  if (!(o.spectral_radius >= 0.0 && o.spectral_radius < 1.0))
+    reject("spectral_radius is " + number(o.spectral_radius) +
+           "; give a number in (0, 1), or 0 to have it estimated");
+  if (o.block_size < 0)
+    reject("block_size is " + std::to_string(o.block_size) +
+           "; give 1 or more, or 0 for the solver's default");
+  if (o.refinement_steps < 0)
+    reject("refinement_steps is " + std::to_string(o.refinement_steps) + "; give 0 or more");
+  if (o.lag_limit < 1) reject("lag_limit is " + std::to_string(o.lag_limit) + "; give 1 or more");
+}
+
+void LinearSolver::set_tolerance(double relative, double absolute) {
+  SolverOptions changed = options_;
+  changed.tolerance = relative;
+  changed.absolute_tolerance = absolute;
+  validate(changed);
+  options_ = changed;
+}
+
+Report LinearSolver::solve_many(const BlockTree& A, int count, std::span<const double> b,
+                                std::span<double> x) {
+  const std::size_t size = static_cast<std::size_t>(A.size());
+  Report worst;
+  for (int k = 0; k < count; ++k) {
+    const Report one = solve(A, b.subspan(k * size, size), x.subspan(k * size, size));
+    worst.iterations += one.iterations;
+    worst.error_estimate = std::max(worst.error_estimate, one.error_estimate);
+    if (!one.ok() && worst.ok()) {
+      worst.outcome = one.outcome;
+      worst.node = one.node;
+    }
+  }
+  return worst;
+}
+
+}  // namespace linkwise
