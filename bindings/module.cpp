@@ -5,8 +5,8 @@
 namespace nb = nanobind;
 
 NB_MODULE(LINKWISE_MODULE_NAME, m) {
-  // Classes say that they live in linkwise._core, which re-exports this module: a pickled model must
-  // open on a machine that picks another CPU target.
+  // Classes say that they live in linkwise._core, which re-exports this module: a pickled model
+  // must open on a machine that picks another CPU target.
   const nb::object module_name = m.attr("__name__");
   m.attr("__name__") = "linkwise._core";
 

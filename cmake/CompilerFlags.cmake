@@ -17,6 +17,8 @@ target_compile_definitions(
 target_compile_options(
   linkwise_flags
   INTERFACE -Wall -Wextra -Wshadow -Wno-psabi $<$<BOOL:${LINKWISE_WERROR}>:-Werror>
+            # GCC 12 warns about its own std::string (PR 105651).
+            $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
             -ffp-contract=fast -fno-math-errno -fno-trapping-math)
 
 if(LINKWISE_SANITIZE)

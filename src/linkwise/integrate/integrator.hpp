@@ -7,6 +7,10 @@
 namespace linkwise {
 
 /// The equations of motion as the integrators see them: ydot = f(t, y) with y = [q; v].
+///
+/// Quaternions in the y given to evaluate() may be slightly off unit length, since the multistep
+/// methods do not project their history: rotations must come from the normalised quaternion and the
+/// rates stay linear in the one given. Its length then has no influence on the motion.
 struct OdeSystem {
   virtual ~OdeSystem() = default;
 
@@ -22,7 +26,7 @@ struct OdeSystem {
   /// Projects y onto its constraints: quaternions back to unit length.
   virtual void normalise(double* y) = 0;
 
-  /// Called after each accepted step.
+  /// Called after each accepted step, with y normalised.
   virtual void accepted(double /*t*/, const double* /*y*/) {}
 };
 
@@ -32,20 +36,21 @@ struct IntegratorOptions {
   double tolerance = 1e-6;          ///< relative and absolute, unless given apart below
   double relative_tolerance = 0.0;  ///< 0: as tolerance
   double absolute_tolerance = 0.0;  ///< 0: as tolerance
-  double step = 0.0;                ///< the step of the fixed-step kinds, which need it
-  double max_step = 0.0;            ///< 0: no bound; variable-step kinds only
-  int max_order = 0;                ///< 0: the highest, 12 for adams and 5 for bdf
-  long max_steps = 0;               ///< steps per start(); 0: no bound
+  double step = 0.0;                ///< of the fixed-step kinds, which need it
+  double max_step = 0.0;            ///< of the variable-step kinds; 0: no bound
+  int max_order = 0;                ///< of the multistep kinds; 0: 12 for adams, 5 for bdf
+  long max_steps = 0;               ///< for one start(); 0: no bound
 };
 
 enum class StepStatus {
   ok,
-  evaluation_failed,  ///< f could not be evaluated, even with much smaller steps
-  not_finite,         ///< f or y holds NaN or infinity
-  step_too_small,     ///< the error test or the corrector fails at the smallest possible step
-  too_many_steps,
+  evaluation_failed,  ///< f could not be evaluated, however small the step
+  not_finite,         ///< f or y became NaN or infinite
+  step_too_small,     ///< no step, however small, passes the error test
+  too_many_steps,     ///< IntegratorOptions::max_steps are taken
 };
 
+/// What happened and what to do about it, in one sentence.
 std::string_view describe(StepStatus status);
 
 struct IntegratorStatistics {
@@ -57,19 +62,22 @@ struct IntegratorStatistics {
   int last_order = 0;
 };
 
-/// Advances one OdeSystem from one start. The system must outlive it.
+/// Advances one OdeSystem, which must outlive it. Exceptions of the system pass through.
 class Integrator {
  public:
+  Integrator() = default;
+  Integrator(const Integrator&) = delete;
+  Integrator& operator=(const Integrator&) = delete;
   virtual ~Integrator() = default;
 
   virtual void start(double t0, std::span<const double> y0) = 0;
 
-  /// Takes one accepted step towards t_limit, past it where the method's own step leads there: the
-  /// steps do not depend on where output is asked for. A status other than ok leaves time() and the
-  /// last step's interpolant as they were.
+  /// Takes one accepted step from time(), past t_limit where the method's own step leads there: the
+  /// steps do not depend on where output is asked for. After a status other than ok, time() and the
+  /// state there are those of the last accepted step and only start() may follow.
   virtual StepStatus step(double t_limit) = 0;
 
-  /// Writes y(t) for t within the last step.
+  /// Writes y(t), normalised, for t within the last step (or at the start, before the first one).
   virtual void interpolate(double t, std::span<double> y) = 0;
 
   virtual double time() const = 0;
@@ -81,15 +89,17 @@ struct IntegratorEntry {
   std::string_view name;
   std::string_view description;
   bool fixed_step;
+  int highest_order;
+  std::unique_ptr<Integrator> (*make)(OdeSystem&, const IntegratorOptions&);
 };
 
-/// Every integrator of this build, in the order in which they are listed to users.
+/// Every integrator of this build, in the order in which users see them listed.
 std::span<const IntegratorEntry> integrator_registry();
 
-/// The entry called name; InputError that lists the known ones otherwise.
+/// The entry of that name; InputError that lists the known ones otherwise.
 const IntegratorEntry& find_integrator(std::string_view name);
 
-/// InputError when an option is out of range for the kind or the build lacks the kind.
+/// InputError where an option is out of range for the kind, or where the build lacks the kind.
 std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, OdeSystem& system,
                                             const IntegratorOptions& options);
 

@@ -1,0 +1,59 @@
+#include "linkwise/integrate/fixed/fixed_step.hpp"
+
+#include <algorithm>
+
+#include "linkwise/base/assert.hpp"
+
+namespace linkwise {
+
+FixedStep::FixedStep(OdeSystem& system, const IntegratorOptions& options)
+    : system_(system), h_(options.step), max_steps_(options.max_steps) {}
+
+void FixedStep::start(double t0, std::span<const double> y0) {
+  LINKWISE_ASSERT(y0.size() == system_.size(), "y0 has the length of the system");
+  start_time_ = time_ = t0;
+  steps_ = 0;
+  system_.evaluations = 0;
+  y_.assign(y0.begin(), y0.end());
+  system_->normalise(y_.data());
+  previous_ = y_;
+  next_ = y_;
+  prepare();
+}
+
+StepStatus FixedStep::step(double /*t_limit*/) {
+  if (max_steps_ > 0 && steps_ >= max_steps_) return StepStatus::too_many_steps;
+  const double t_next = start_time_ + static_cast<double>(steps_ + 1) * h_;
+  if (!(t_next > time_)) return StepStatus::step_too_small;
+  const StepStatus status = advance(time_, h_);
+  if (status != StepStatus::ok) return status;
+  previous_.swap(y_);
+  y_.swap(next_);
+  time_ = t_next;
+  ++steps_;
+  system_->accepted(time_, y_.data());
+  return StepStatus::ok;
+}
+
+void FixedStep::interpolate(double t, std::span<double> y) {
+  LINKWISE_ASSERT(y.size() == system_.size(), "y has the length of the system");
+  if (steps_ == 0 || t == time_) {
+    std::copy(y_.begin(), y_.end(), y.begin());
+    return;
+  }
+  const double s = 1.0 + (t - time_) / h_;
+  LINKWISE_ASSERT(s > -1e-6 && s < 1.0 + 1e-6, "t lies within the last step");
+  interpolate_fraction(s, y);
+  system_->normalise(y.data());
+}
+
+IntegratorStatistics FixedStep::statistics() const {
+  IntegratorStatistics result;
+  result.steps = steps_;
+  result.evaluations = system_.evaluations;
+  result.last_step = steps_ > 0 ? h_ : 0.0;
+  result.last_order = steps_ > 0 ? order() : 0;
+  return result;
+}
+
+}  // namespace linkwise

@@ -1,0 +1,52 @@
+/// Symplectic (semi-implicit) Euler [Hairer2006, I.1.2]:
+///   v(t + h) = v + h vdot(t, q, v),   q(t + h) = q + h qdot(q, v(t + h)).
+/// Order 1, one evaluation a step; where the forces are conservative the energy error stays
+/// bounded. Between steps it is linear, which is what the method assumes of q.
+#include "linkwise/integrate/fixed/semi_implicit_euler.hpp"
+
+#include <cstddef>
+#include <vector>
+
+#include "linkwise/integrate/fixed/fixed_step.hpp"
+
+namespace linkwise {
+namespace {
+
+class SemiImplicitEuler final : public FixedStep {
+ public:
+  using FixedStep::FixedStep;
+
+ private:
+  int order() const override { return 1; }
+
+  void prepare() override { rate_.assign(system_.size(), 0.0); }
+
+  StepStatus advance(double t, double h) override {
+    const StepStatus status = system_.evaluate(t, y().data(), rate_.data());
+    if (status != StepStatus::ok) return status;
+    const std::size_t nq = system_.position_size();
+    for (std::size_t i = nq; i < rate_.size(); ++i) next()[i] = y()[i] + h * rate_[i];
+    system_->position_rates(y().data(), next().data() + nq, rate_.data());
+    for (std::size_t i = 0; i < nq; ++i) next()[i] = y()[i] + h * rate_[i];
+    if (!all_finite(next())) return StepStatus::not_finite;
+    system_->normalise(next().data());
+    return StepStatus::ok;
+  }
+
+  void interpolate_fraction(double s, std::span<double> result) override {
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      result[i] = (1.0 - s) * previous()[i] + s * y()[i];
+    }
+  }
+
+  std::vector<double> rate_;
+};
+
+}  // namespace
+
+std::unique_ptr<Integrator> make_semi_implicit_euler(OdeSystem& system,
+                                                     const IntegratorOptions& options) {
+  return std::make_unique<SemiImplicitEuler>(system, options);
+}
+
+}  // namespace linkwise

@@ -1,0 +1,128 @@
+#include "linkwise/integrate/integrator.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/integrate/fixed/runge_kutta_4.hpp"
+#include "linkwise/integrate/fixed/semi_implicit_euler.hpp"
+#if defined(LINKWISE_WITH_SUNDIALS)
+#include "linkwise/integrate/sundials/cvode.hpp"
+#endif
+
+namespace linkwise {
+namespace {
+
+constexpr IntegratorEntry entries[] = {
+#if defined(LINKWISE_WITH_SUNDIALS)
+    {IntegratorKind::adams, "adams",
+     "variable-order Adams, 1 to 12, functional iteration (CVODE); for motion that is not stiff",
+     false, 12, make_adams},
+    {IntegratorKind::bdf, "bdf",
+     "variable-order backward differentiation, 1 to 5, Newton iteration (CVODE); for stiff springs "
+     "and stops",
+     false, 5, make_bdf},
+#endif
+    {IntegratorKind::runge_kutta_4, "runge_kutta_4",
+     "classical Runge-Kutta of order 4 with a fixed step; no error control", true, 4,
+     make_runge_kutta_4},
+    {IntegratorKind::semi_implicit_euler, "semi_implicit_euler",
+     "symplectic Euler of order 1 with a fixed step; no error control, energy stays bounded", true,
+     1, make_semi_implicit_euler},
+};
+
+std::string known_names() {
+  std::string names;
+  for (const IntegratorEntry& entry : entries) {
+    if (!names.empty()) names += ", ";
+    names += entry.name;
+  }
+  return names;
+}
+
+[[noreturn]] void reject(std::string_view option, double value, std::string_view rule) {
+  char number[32];
+  std::snprintf(number, sizeof number, "%g", value);
+  throw InputError("integrator option " + std::string(option) + " is " + number + "; " +
+                   std::string(rule));
+}
+
+bool positive(double value) { return std::isfinite(value) && value > 0.0; }
+bool positive_or_zero(double value) { return std::isfinite(value) && value >= 0.0; }
+
+void check(const IntegratorEntry& entry, const IntegratorOptions& options) {
+  if (!positive(options.tolerance)) {
+    reject("tolerance", options.tolerance, "give a positive number such as 1e-6");
+  }
+  if (!positive_or_zero(options.relative_tolerance)) {
+    reject("relative_tolerance", options.relative_tolerance, "give a positive number");
+  }
+  if (!positive_or_zero(options.absolute_tolerance)) {
+    reject("absolute_tolerance", options.absolute_tolerance, "give a positive number");
+  }
+  if (!positive_or_zero(options.max_step)) {
+    reject("max_step", options.max_step, "give a positive number of seconds, or 0 for no bound");
+  }
+  if (entry.fixed_step && !positive(options.step)) {
+    reject("step", options.step,
+           std::string(entry.name) + " needs a fixed step: give a positive number of seconds");
+  }
+  if (!entry.fixed_step && options.step != 0.0) {
+    reject("step", options.step,
+           std::string(entry.name) + " chooses its own: leave it out, or bound it with max_step");
+  }
+  if (options.max_order < 0 || options.max_order > entry.highest_order) {
+    reject("max_order", options.max_order,
+           std::string(entry.name) + " takes 1 to " + std::to_string(entry.highest_order) +
+               ", or 0 for the highest");
+  }
+  if (options.max_steps < 0) {
+    reject("max_steps", static_cast<double>(options.max_steps),
+           "give a positive number, or 0 for no bound");
+  }
+}
+
+}  // namespace
+
+std::string_view describe(StepStatus status) {
+  switch (status) {
+    case StepStatus::ok:
+      return "the step was accepted";
+    case StepStatus::evaluation_failed:
+      return "the accelerations could not be computed, however small the step; look at the state "
+             "and the drives at this time";
+    case StepStatus::not_finite:
+      return "the motion stopped being finite; look for an unstable drive, a huge force, or take a "
+             "smaller step";
+    case StepStatus::step_too_small:
+      return "no step, however small, meets the tolerance; look for a jump in a drive or a "
+             "singular motion at this time, loosen the tolerance, or try bdf";
+    case StepStatus::too_many_steps:
+      return "the allowed number of steps is used up; raise max_steps, loosen the tolerance, or "
+             "try bdf if the system is stiff";
+  }
+  return "unknown status";
+}
+
+std::span<const IntegratorEntry> integrator_registry() { return entries; }
+
+const IntegratorEntry& find_integrator(std::string_view name) {
+  for (const IntegratorEntry& entry : entries) {
+    if (entry.name == name) return entry;
+  }
+  throw InputError("unknown integrator '" + std::string(name) + "'; known are " + known_names());
+}
+
+std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, OdeSystem& system,
+                                            const IntegratorOptions& options) {
+  for (const IntegratorEntry& entry : entries) {
+    if (entry.kind != kind) continue;
+    check(entry, options);
+    return entry.make(system, options);
+  }
+  throw InputError("this build of linkwise has no SUNDIALS, hence no adams and no bdf; use " +
+                   known_names());
+}
+
+}  // namespace linkwise

@@ -1,0 +1,260 @@
+/// CVODE's variable-order, variable-step multistep methods [Hindmarsh2005]: Adams-Moulton with
+/// functional iteration, and backward differentiation with Newton iteration. The error test bounds
+/// the root mean square of e_i / (rtol |y_i| + atol) by 1 in every step. Output is read off the
+/// method's own interpolating polynomial, so the steps do not depend on the output times.
+#include "linkwise/integrate/sundials/cvode.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <sunlinsol/sunlinsol_dense.h>
+#include <sunlinsol/sunlinsol_spgmr.h>
+#include <sunmatrix/sunmatrix_dense.h>
+#include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
+
+#include "linkwise/base/assert.hpp"
+#include "linkwise/integrate/checked_system.hpp"
+#include "linkwise/integrate/sundials/handles.hpp"
+
+namespace linkwise {
+namespace {
+
+using namespace sundials;
+
+/// Up to this many unknowns the Newton matrix is formed by differences, one evaluation a column,
+/// and factorised; above, GMRES needs one evaluation an iteration and no matrix.
+constexpr int largest_dense_size = 400;
+constexpr int krylov_dimension = 30;
+
+/// Quaternions that drifted this far from unit length are put back by a restart of the method: its
+/// history cannot be projected. The motion does not feel the drift (see OdeSystem), the error
+/// weights would.
+constexpr double largest_drift = 1e-3;
+
+class Cvode final : public Integrator {
+ public:
+  Cvode(int method, OdeSystem& system, const IntegratorOptions& options);
+
+  void start(double t0, std::span<const double> y0) override;
+  StepStatus step(double t_limit) override;
+  void interpolate(double t, std::span<double> y) override;
+  double time() const override { return time_; }
+  IntegratorStatistics statistics() const override;
+
+ private:
+  void attach_solvers(int method);
+  void restart();
+  void read_counters();
+  StepStatus classify(int flag) const;
+  StepStatus no_smaller_step() const;
+  static int right_hand_side(sunrealtype t, N_Vector y, N_Vector ydot, void* self);
+
+  double* data(const Vector& vector) const { return N_VGetArrayPointer(vector.get()); }
+  std::size_t size() const { return system_.size(); }
+
+  CheckedSystem system_;
+  IntegratorOptions options_;
+  Context context_;
+  Vector y_;        ///< what CVODE returned last
+  Vector scratch_;  ///< interpolated values
+  Matrix matrix_;
+  LinearSolverHandle linear_solver_;
+  NonlinearSolverHandle nonlinear_solver_;
+  Memory memory_;
+
+  std::vector<double> state_;  ///< normalised, at time_
+  double time_ = 0.0;
+  bool interpolant_valid_ = false;
+  bool restart_needed_ = false;
+  StepStatus failure_ = StepStatus::ok;  ///< of the last evaluation that failed
+  long steps_since_failure_ = 0;
+  std::exception_ptr exception_;
+  IntegratorStatistics counters_;  ///< since the last restart, as CVODE counts
+  IntegratorStatistics earlier_;   ///< before it
+};
+
+Cvode::Cvode(int method, OdeSystem& system, const IntegratorOptions& options)
+    : system_(system), options_(options) {
+  // CVODE's norm is a mean over the components: a system without any gets one that stays zero.
+  const auto length = static_cast<sunindextype>(std::max<std::size_t>(size(), 1));
+  y_.reset(check_allocated(N_VNew_Serial(length, context_)));
+  scratch_.reset(check_allocated(N_VNew_Serial(length, context_)));
+  N_VConst(0.0, y_.get());
+  memory_.reset(check_allocated(CVodeCreate(method, context_)));
+  void* memory = memory_.get();
+  check(CVodeInit(memory, right_hand_side, 0.0, y_.get()), "CVodeInit");
+  check(CVodeSetUserData(memory, this), "CVodeSetUserData");
+  const double relative = options.relative_tolerance, absolute = options.absolute_tolerance;
+  check(CVodeSStolerances(memory, relative > 0.0 ? relative : options.tolerance,
+                          absolute > 0.0 ? absolute : options.tolerance),
+        "CVodeSStolerances");
+  check(CVodeSetMaxHnilWarns(memory, -1), "CVodeSetMaxHnilWarns");
+  if (options.max_order > 0) check(CVodeSetMaxOrd(memory, options.max_order), "CVodeSetMaxOrd");
+  if (options.max_step > 0.0) check(CVodeSetMaxStep(memory, options.max_step), "CVodeSetMaxStep");
+  attach_solvers(method);
+}
+
+void Cvode::attach_solvers(int method) {
+  void* memory = memory_.get();
+  if (method == CV_ADAMS) {
+    nonlinear_solver_.reset(check_allocated(SUNNonlinSol_FixedPoint(y_.get(), 0, context_)));
+  } else {
+    nonlinear_solver_.reset(check_allocated(SUNNonlinSol_Newton(y_.get(), context_)));
+  }
+  check(CVodeSetNonlinearSolver(memory, nonlinear_solver_.get()), "CVodeSetNonlinearSolver");
+  if (method == CV_ADAMS) return;
+  const sunindextype n = N_VGetLength(y_.get());
+  if (n <= largest_dense_size) {
+    matrix_.reset(check_allocated(SUNDenseMatrix(n, n, context_)));
+    linear_solver_.reset(check_allocated(SUNLinSol_Dense(y_.get(), matrix_.get(), context_)));
+  } else {
+    linear_solver_.reset(
+        check_allocated(SUNLinSol_SPGMR(y_.get(), SUN_PREC_NONE, krylov_dimension, context_)));
+  }
+  check(CVodeSetLinearSolver(memory, linear_solver_.get(), matrix_.get()), "CVodeSetLinearSolver");
+}
+
+int Cvode::right_hand_side(sunrealtype t, N_Vector y, N_Vector ydot, void* self) {
+  Cvode& cvode = *static_cast<Cvode*>(self);
+  // Exceptions must not unwind through C.
+  try {
+    double* rate = N_VGetArrayPointer(ydot);
+    if (cvode.size() == 0) *rate = 0.0;
+    const StepStatus status = cvode.system_.evaluate(t, N_VGetArrayPointer(y), rate);
+    if (status == StepStatus::ok) return 0;
+    cvode.failure_ = status;
+    cvode.steps_since_failure_ = 0;
+    return 1;  // positive: CVODE tries again with a smaller step
+  } catch (...) {
+    cvode.exception_ = std::current_exception();
+    return -1;
+  }
+}
+
+void Cvode::start(double t0, std::span<const double> y0) {
+  LINKWISE_ASSERT(y0.size() == size(), "y0 has the length of the system");
+  state_.assign(y0.begin(), y0.end());
+  system_->normalise(state_.data());
+  time_ = t0;
+  system_.evaluations = 0;
+  counters_ = earlier_ = {};
+  failure_ = StepStatus::ok;
+  restart();
+}
+
+/// Begins a new history at time_ and state_.
+void Cvode::restart() {
+  N_VConst(0.0, y_.get());
+  std::copy(state_.begin(), state_.end(), data(y_));
+  check(CVodeReInit(memory_.get(), time_, y_.get()), "CVodeReInit");
+  earlier_.steps += counters_.steps;
+  earlier_.error_test_failures += counters_.error_test_failures;
+  earlier_.nonlinear_failures += counters_.nonlinear_failures;
+  counters_ = {};
+  interpolant_valid_ = false;
+  restart_needed_ = false;
+}
+
+StepStatus Cvode::step(double /*t_limit*/) {
+  if (options_.max_steps > 0 && earlier_.steps + counters_.steps >= options_.max_steps) {
+    return StepStatus::too_many_steps;
+  }
+  if (restart_needed_) restart();
+  // CVODE bounds its very first step by a tenth of the distance to this time and ignores it later.
+  // It is not t_limit, or the first step would depend on the output times.
+  const double horizon = time_ + (options_.max_step > 0.0 ? 10.0 * options_.max_step : 1.0);
+  sunrealtype t = time_;
+  const int flag = CVode(memory_.get(), horizon, y_.get(), &t, CV_ONE_STEP);
+  if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
+  interpolant_valid_ = false;
+  if (flag < 0) return classify(flag);
+  if (!all_finite({data(y_), size()})) return StepStatus::not_finite;
+  // CVODE goes on with steps that round-off swallows; nothing would ever end it.
+  if (!(t > time_ + 4.0 * std::numeric_limits<double>::epsilon() * std::abs(time_))) {
+    return no_smaller_step();
+  }
+  time_ = t;
+  ++steps_since_failure_;
+  std::copy_n(data(y_), size(), state_.begin());
+  system_->normalise(state_.data());
+  for (std::size_t i = 0; i < size(); ++i) {
+    restart_needed_ |= std::abs(state_[i] - data(y_)[i]) > largest_drift;
+  }
+  interpolant_valid_ = true;
+  read_counters();
+  system_->accepted(time_, state_.data());
+  return StepStatus::ok;
+}
+
+StepStatus Cvode::classify(int flag) const {
+  switch (flag) {
+    case CV_RHSFUNC_FAIL:
+    case CV_FIRST_RHSFUNC_ERR:
+    case CV_REPTD_RHSFUNC_ERR:
+    case CV_UNREC_RHSFUNC_ERR:
+    case CV_TOO_MUCH_ACC:
+    case CV_ERR_FAILURE:
+    case CV_CONV_FAILURE:
+    case CV_LSETUP_FAIL:
+    case CV_LSOLVE_FAIL:
+      return no_smaller_step();
+    default:
+      check(flag, "CVode");
+      return StepStatus::step_too_small;
+  }
+}
+
+/// Why the steps became too small. Before a time or state that cannot be evaluated, they do so
+/// gradually: CVODE creeps up to it.
+StepStatus Cvode::no_smaller_step() const {
+  constexpr long recent = 20;
+  const bool failed = failure_ != StepStatus::ok && steps_since_failure_ <= recent;
+  return failed ? failure_ : StepStatus::step_too_small;
+}
+
+void Cvode::read_counters() {
+  void* memory = memory_.get();
+  CVodeGetNumSteps(memory, &counters_.steps);
+  CVodeGetNumErrTestFails(memory, &counters_.error_test_failures);
+  CVodeGetNumNonlinSolvConvFails(memory, &counters_.nonlinear_failures);
+  CVodeGetLastStep(memory, &counters_.last_step);
+  CVodeGetLastOrder(memory, &counters_.last_order);
+}
+
+void Cvode::interpolate(double t, std::span<double> y) {
+  LINKWISE_ASSERT(y.size() == size(), "y has the length of the system");
+  if (t == time_ || !interpolant_valid_) {
+    LINKWISE_ASSERT(t == time_, "there is no step to interpolate in");
+    std::copy(state_.begin(), state_.end(), y.begin());
+    return;
+  }
+  check(CVodeGetDky(memory_.get(), t, 0, scratch_.get()), "CVodeGetDky");
+  std::copy_n(data(scratch_), y.size(), y.begin());
+  system_->normalise(y.data());
+}
+
+IntegratorStatistics Cvode::statistics() const {
+  IntegratorStatistics result = counters_;
+  result.steps += earlier_.steps;
+  result.evaluations = system_.evaluations;
+  result.error_test_failures += earlier_.error_test_failures;
+  result.nonlinear_failures += earlier_.nonlinear_failures;
+  return result;
+}
+
+}  // namespace
+
+std::unique_ptr<Integrator> make_adams(OdeSystem& system, const IntegratorOptions& options) {
+  return std::make_unique<Cvode>(CV_ADAMS, system, options);
+}
+
+std::unique_ptr<Integrator> make_bdf(OdeSystem& system, const IntegratorOptions& options) {
+  return std::make_unique<Cvode>(CV_BDF, system, options);
+}
+
+}  // namespace linkwise

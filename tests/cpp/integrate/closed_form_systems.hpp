@@ -1,0 +1,100 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "linkwise/integrate/integrator.hpp"
+
+namespace linkwise::test {
+
+/// q'' = -q + 3 cos(2 t), q(0) = q'(0) = 0, whose solution is cos t - cos 2t.
+struct ForcedOscillator : OdeSystem {
+  int size() const override { return 2; }
+  int position_size() const override { return 1; }
+  bool evaluate(double t, const double* y, double* ydot) override {
+    ydot[0] = y[1];
+    ydot[1] = -y[0] + 3.0 * std::cos(2.0 * t);
+    return true;
+  }
+  void position_rates(const double*, const double* v, double* qdot) override { qdot[0] = v[0]; }
+  void normalise(double*) override {}
+
+  static std::array<double, 2> initial() { return {0.0, 0.0}; }
+  static std::array<double, 2> solution(double t) {
+    return {std::cos(t) - std::cos(2.0 * t), -std::sin(t) + 2.0 * std::sin(2.0 * t)};
+  }
+  static double error(double t, const std::vector<double>& y) {
+    const auto exact = solution(t);
+    return std::max(std::abs(y[0] - exact[0]), std::abs(y[1] - exact[1]));
+  }
+};
+
+/// Velocities alone, v' = f(t, v), with f given by the test.
+struct FirstOrder : OdeSystem {
+  using Rate = std::function<bool(double t, const double* v, double* rate)>;
+  FirstOrder(int n, Rate f) : n_(n), rate(std::move(f)) {}
+  int size() const override { return n_; }
+  int position_size() const override { return 0; }
+  bool evaluate(double t, const double* y, double* ydot) override { return rate(t, y, ydot); }
+  void position_rates(const double*, const double*, double*) override {}
+  void normalise(double*) override {}
+  void accepted(double t, const double*) override { accepted_times.push_back(t); }
+
+  int n_;
+  Rate rate;
+  std::vector<double> accepted_times;
+};
+
+/// A unit quaternion (x, y, z, w) turning at the constant angular velocity (0, 0, rate) in the
+/// body.
+struct SpinningBody : OdeSystem {
+  int size() const override { return 7; }
+  int position_size() const override { return 4; }
+  bool evaluate(double, const double* y, double* ydot) override {
+    position_rates(y, y + 4, ydot);
+    ydot[4] = ydot[5] = ydot[6] = 0.0;
+    return true;
+  }
+  void position_rates(const double* q, const double* w, double* qdot) override {
+    const double x = q[0], y = q[1], z = q[2], s = q[3];
+    qdot[0] = 0.5 * (s * w[0] + y * w[2] - z * w[1]);
+    qdot[1] = 0.5 * (s * w[1] + z * w[0] - x * w[2]);
+    qdot[2] = 0.5 * (s * w[2] + x * w[1] - y * w[0]);
+    qdot[3] = -0.5 * (x * w[0] + y * w[1] + z * w[2]);
+  }
+  void normalise(double* y) override {
+    const double length = std::hypot(std::hypot(y[0], y[1]), std::hypot(y[2], y[3]));
+    for (int i = 0; i < 4; ++i) y[i] /= length;
+  }
+  static std::vector<double> initial(double rate) { return {0, 0, 0, 1, 0, 0, rate}; }
+  static double norm(const std::vector<double>& y) {
+    return std::hypot(std::hypot(y[0], y[1]), std::hypot(y[2], y[3]));
+  }
+};
+
+/// Steps to t_end and returns y there; the status of the last step is in status.
+inline std::vector<double> integrate_to(Integrator& integrator, double t_end, int size,
+                                        StepStatus* status = nullptr) {
+  StepStatus last = StepStatus::ok;
+  while (integrator.time() < t_end && last == StepStatus::ok) last = integrator.step(t_end);
+  if (status != nullptr) *status = last;
+  std::vector<double> y(static_cast<std::size_t>(size));
+  integrator.interpolate(std::min(t_end, integrator.time()), y);
+  return y;
+}
+
+/// The least-squares slope of log(y) over log(x).
+inline double log_slope(const std::vector<double>& x, const std::vector<double>& y) {
+  double sx = 0, sy = 0, sxx = 0, sxy = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double u = std::log(x[i]), v = std::log(y[i]);
+    sx += u, sy += v, sxx += u * u, sxy += u * v;
+  }
+  const auto n = static_cast<double>(x.size());
+  return (n * sxy - sx * sy) / (n * sxx - sx * sx);
+}
+
+}  // namespace linkwise::test

@@ -1,0 +1,111 @@
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "integrate/closed_form_systems.hpp"
+#include "linkwise/integrate/integrator.hpp"
+
+namespace linkwise::test {
+namespace {
+
+std::unique_ptr<Integrator> make(IntegratorKind kind, OdeSystem& system, double step) {
+  IntegratorOptions options;
+  options.step = step;
+  return make_integrator(kind, system, options);
+}
+
+/// The largest error at the fraction s of every step up to t = 2, over halved steps.
+double convergence_order(IntegratorKind kind, double s) {
+  std::vector<double> steps, errors;
+  for (const double step : {0.04, 0.02, 0.01, 0.005}) {
+    ForcedOscillator system;
+    const auto integrator = make(kind, system, step);
+    integrator->start(0.0, ForcedOscillator::initial());
+    double error = 0.0;
+    std::vector<double> y(2);
+    while (integrator->time() < 2.0 - 0.5 * step) {
+      const double before = integrator->time();
+      EXPECT_EQ(integrator->step(2.0), StepStatus::ok);
+      const double t = before + s * (integrator->time() - before);
+      integrator->interpolate(t, y);
+      error = std::max(error, ForcedOscillator::error(t, y));
+    }
+    steps.push_back(step);
+    errors.push_back(error);
+  }
+  return log_slope(steps, errors);
+}
+
+TEST(RungeKutta4, HasOrderFourAtAndBetweenSteps) {
+  for (const double s : {1.0, 0.5, 0.3}) {
+    EXPECT_NEAR(convergence_order(IntegratorKind::runge_kutta_4, s), 4.0, 0.1) << s;
+  }
+}
+
+TEST(RungeKutta4, EvaluatesFourTimesAStep) {
+  ForcedOscillator system;
+  const auto integrator = make(IntegratorKind::runge_kutta_4, system, 0.1);
+  integrator->start(0.0, ForcedOscillator::initial());
+  for (int i = 0; i < 10; ++i) ASSERT_EQ(integrator->step(1.0), StepStatus::ok);
+  EXPECT_EQ(integrator->statistics().evaluations, 4 * 10 + 1);
+}
+
+TEST(RungeKutta4, IsExactForPolynomialsOfDegreeFour) {
+  FirstOrder system(1, [](double t, const double*, double* rate) {
+    rate[0] = 4.0 * t * t * t;
+    return true;
+  });
+  const auto integrator = make(IntegratorKind::runge_kutta_4, system, 0.5);
+  integrator->start(0.0, std::vector<double>{1.0});
+  for (int i = 0; i < 4; ++i) ASSERT_EQ(integrator->step(2.0), StepStatus::ok);
+  std::vector<double> y(1);
+  integrator->interpolate(2.0, y);
+  EXPECT_DOUBLE_EQ(y[0], 17.0);
+}
+
+TEST(SemiImplicitEuler, HasOrderOneAtAndBetweenSteps) {
+  for (const double s : {1.0, 0.5}) {
+    EXPECT_NEAR(convergence_order(IntegratorKind::semi_implicit_euler, s), 1.0, 0.1) << s;
+  }
+}
+
+TEST(SemiImplicitEuler, ConservesTheModifiedEnergyOfAnOscillator) {
+  // Of q'' = -q, semi-implicit Euler conserves q^2 + v^2 - h q v exactly [Hairer2006, I.2].
+  struct Oscillator : ForcedOscillator {
+    bool evaluate(double, const double* y, double* ydot) override {
+      ydot[0] = y[1];
+      ydot[1] = -y[0];
+      return true;
+    }
+  } system;
+  const double h = 0.1;
+  const auto integrator = make(IntegratorKind::semi_implicit_euler, system, h);
+  integrator->start(0.0, std::vector<double>{1.0, 0.0});
+  std::vector<double> y(2);
+  for (int i = 0; i < 10000; ++i) {
+    ASSERT_EQ(integrator->step(1e9), StepStatus::ok);
+    integrator->interpolate(integrator->time(), y);
+    ASSERT_NEAR(y[0] * y[0] + y[1] * y[1] - h * y[0] * y[1], 1.0, 1e-12);
+  }
+}
+
+TEST(FixedStep, StaysOnTheGridOfTheStart) {
+  ForcedOscillator system;
+  const auto integrator = make(IntegratorKind::semi_implicit_euler, system, 0.1);
+  integrator->start(2.0, ForcedOscillator::initial());
+  for (int i = 1; i <= 100000; ++i) {
+    ASSERT_EQ(integrator->step(1e9), StepStatus::ok);
+    ASSERT_EQ(integrator->time(), 2.0 + i * 0.1);
+  }
+}
+
+TEST(FixedStep, RefusesAStepThatRoundOffSwallows) {
+  ForcedOscillator system;
+  const auto integrator = make(IntegratorKind::runge_kutta_4, system, 1e-9);
+  integrator->start(1e9, ForcedOscillator::initial());
+  EXPECT_EQ(integrator->step(2e9), StepStatus::step_too_small);
+}
+
+}  // namespace
+}  // namespace linkwise::test
