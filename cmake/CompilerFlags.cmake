@@ -4,8 +4,6 @@
 # survive. The three flags below give its speed where it matters: fused multiply-add, and no errno
 # or trap bookkeeping around square roots and selects.
 
-include(CheckCXXCompilerFlag)
-
 add_library(linkwise_flags INTERFACE)
 target_include_directories(linkwise_flags INTERFACE ${PROJECT_SOURCE_DIR}/src)
 target_link_libraries(linkwise_flags INTERFACE Threads::Threads)
@@ -31,12 +29,9 @@ else()
   # The kernels are small constant-size blocks: they are fast when their loops are unrolled in full
   # and slow when the superword vectoriser then packs the scalars of one block into a register (a
   # factor of two on GCC 12). Vectors come from independent lanes instead, see simd/.
-  foreach(flag IN ITEMS "-fno-tree-slp-vectorize" "--param=max-completely-peeled-insns=4000"
-                        "--param=max-completely-peel-times=40")
-    string(MAKE_C_IDENTIFIER "LINKWISE_HAS${flag}" has_flag)
-    check_cxx_compiler_flag(${flag} ${has_flag})
-    if(${has_flag})
-      target_compile_options(linkwise_flags INTERFACE $<$<NOT:$<CONFIG:Debug>>:${flag}>)
-    endif()
-  endforeach()
+  target_compile_options(linkwise_flags INTERFACE $<$<NOT:$<CONFIG:Debug>>:-fno-tree-slp-vectorize>)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(linkwise_flags INTERFACE --param=max-completely-peeled-insns=4000
+                                                    --param=max-completely-peel-times=40)
+  endif()
 endif()

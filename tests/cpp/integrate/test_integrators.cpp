@@ -179,7 +179,9 @@ TEST_P(EveryIntegrator, FailsInTheVeryFirstEvaluationWithoutMoving) {
   FirstOrder system(1, [](double, const double*, double*) { return false; });
   const auto integrator = make(system);
   integrator->start(3.0, std::vector<double>{2.0});
+  testing::internal::CaptureStderr();
   EXPECT_EQ(integrator->step(4.0), StepStatus::evaluation_failed);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   EXPECT_EQ(integrator->time(), 3.0);
   std::vector<double> y(1);
   integrator->interpolate(3.0, y);

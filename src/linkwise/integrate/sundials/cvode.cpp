@@ -94,6 +94,9 @@ Cvode::Cvode(int method, OdeSystem& system, const IntegratorOptions& options)
                           absolute > 0.0 ? absolute : options.tolerance),
         "CVodeSStolerances");
   check(CVodeSetMaxHnilWarns(memory, -1), "CVodeSetMaxHnilWarns");
+#if SUNDIALS_VERSION_MAJOR < 7
+  check(CVodeSetErrFile(memory, nullptr), "CVodeSetErrFile");
+#endif
   if (options.max_order > 0) check(CVodeSetMaxOrd(memory, options.max_order), "CVodeSetMaxOrd");
   if (options.max_step > 0.0) check(CVodeSetMaxStep(memory, options.max_step), "CVodeSetMaxStep");
   attach_solvers(method);
