@@ -1,6 +1,6 @@
 # Flags of linkwise's own code, carried by the interface target linkwise_flags.
 #
-# -ffast-math is never used: results must not depend on it, and checks for non-finite numbers must
+# Fast-math is never switched on as a whole: results must not depend on it, and checks for non-finite numbers must
 # survive. The three flags below give its speed where it matters: fused multiply-add, and no errno
 # or trap bookkeeping around square roots and selects.
 

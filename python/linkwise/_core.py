@@ -1,9 +1,9 @@
 """The compiled core, in the variant that suits this machine's CPU.
 
-The core is built once per CPU target: ``v2``, ``v3`` and ``v4`` are the levels of x86-64, ``generic``
-is any other processor, ``native`` a developer's build for the machine it was built on. The best one
-that the CPU supports is imported and all its public names are re-exported here; ``cpu_target`` names
-it. The environment variable ``LINKWISE_CPU`` asks for one of them instead.
+The core is built once per CPU target: ``v2``, ``v3`` and ``v4`` are the levels of x86-64,
+``generic`` is any other processor, ``native`` a developer's build for the machine it was built on.
+The best one that the CPU supports is imported and all its public names are re-exported here;
+``cpu_target`` names it. The environment variable ``LINKWISE_CPU`` asks for one of them instead.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ TARGETS = ("native", "v4", "v3", "v2", "generic")
 
 # What each level needs, in the names of /proc/cpuinfo (abm is lzcnt).
 _NEEDED = {
-    "v2": frozenset("cx16 lahf_lm popcnt sse4_1 sse4_2 ssse3".split()),
-    "v3": frozenset("abm avx avx2 bmi1 bmi2 f16c fma movbe xsave".split()),
-    "v4": frozenset("avx512bw avx512cd avx512dq avx512f avx512vl".split()),
+    "v2": frozenset({"cx16", "lahf_lm", "popcnt", "sse4_1", "sse4_2", "ssse3"}),
+    "v3": frozenset({"abm", "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe", "xsave"}),
+    "v4": frozenset({"avx512bw", "avx512cd", "avx512dq", "avx512f", "avx512vl"}),
 }
 _NEEDED["v3"] |= _NEEDED["v2"]
 _NEEDED["v4"] |= _NEEDED["v3"]
@@ -60,8 +60,8 @@ def _choose(asked: str | None) -> str:
     built = [t for t in TARGETS if importlib.util.find_spec(_module_name(t)) is not None]
     if not built:
         raise ImportError(
-            "linkwise: the compiled core is missing; install the package (pip install .) instead of "
-            "importing it from its source folder"
+            "linkwise: the compiled core is missing; install the package (pip install .) instead "
+            "of importing it from its source folder"
         )
     if asked:
         if asked not in TARGETS:
@@ -83,8 +83,8 @@ def _choose(asked: str | None) -> str:
         if not _unsupported(target):
             return target
     raise ImportError(
-        f"linkwise: this build is for {', '.join(built)} and this CPU supports none of them; rebuild "
-        "with pip install . --config-settings=cmake.define.LINKWISE_CPU_TARGETS=native"
+        f"linkwise: this build is for {', '.join(built)} and this CPU supports none of them; "
+        "rebuild with pip install . --config-settings=cmake.define.LINKWISE_CPU_TARGETS=native"
     )
 
 

@@ -1,0 +1,113 @@
+"""Checks that the C++ sources include only what their layer may see (ARCHITECTURE.md, layers).
+
+Run from anywhere: python tools/check_layers.py [repository]. Prints one line per violation and
+exits with status 1 when there is any.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+#: What each layer may include besides itself. Two columns, numerics and mechanics, meet in
+#: dynamics: solve never sees a mechanism, constraint fills the systems of linear without solving.
+BASE = {"base", "simd"}
+NUMERICS = BASE | {"exec", "linear", "solve"}
+MECHANICS = BASE | {"spatial", "joints", "model", "kinematics", "forces", "constraint"}
+LAYERS = {
+    "base": set(),
+    "simd": {"base"},
+    "exec": BASE,
+    "linear": BASE | {"exec"},
+    "solve": BASE | {"exec", "linear"},
+    "spatial": BASE,
+    "joints": BASE | {"spatial"},
+    "model": BASE | {"spatial", "joints"},
+    "kinematics": BASE | {"spatial", "joints", "model"},
+    "forces": BASE | {"spatial", "joints", "model", "kinematics"},
+    "constraint": BASE | {"spatial", "joints", "model", "kinematics", "forces", "linear"},
+    "dynamics": NUMERICS | MECHANICS,
+    "integrate": BASE | {"exec"},
+    "simulate": NUMERICS | MECHANICS | {"dynamics", "integrate"},
+}
+
+#: Third parties and the only folders that may include them.
+THIRD_PARTIES = {
+    r"(sundials|cvodes?|arkode|kinsol|idas?|nvector|sunlinsol|sunmatrix|sunnonlinsol)/": (
+        "src/linkwise/integrate/sundials"
+    ),
+    r"(nanobind/|Python\.h)": "bindings",
+    r"mpi\.h": "src/linkwise/exec/mpi",
+    r"(cuda|cub/|cooperative_groups|thrust/|nccl)": "src/linkwise/exec/cuda",
+    r"(gtest|gmock)/": "tests/cpp",
+    r"(benchmark|pinocchio)/": "benchmarks",
+}
+#: Headers of the compiler and of POSIX, which any layer may include.
+SYSTEM = re.compile(
+    r"([a-z_]+intrin|unistd|sched|pthread|sys/(mman|resource|stat|types))\.h|[a-z0-9_]+"
+)
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+SUFFIXES = {".hpp", ".cpp", ".cu", ".h"}
+
+
+def includes(path: Path) -> Iterator[tuple[int, str, str]]:
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+        if match := INCLUDE.match(line):
+            yield number, match[1], match[2]
+
+
+def layer_of(path: str) -> str | None:
+    """The layer whose rules hold for a file; a test of a layer sees what the layer sees."""
+    match = re.match(r"(?:src/linkwise|tests/cpp)/([^/]+)/", path)
+    return match[1] if match else None
+
+
+def check_include(path: str, quote: str, target: str) -> str | None:
+    """What is wrong with one include, or None."""
+    if own := re.match(r"linkwise/([^/]+)/", target):
+        layer = layer_of(path)
+        if quote == "<":
+            return f'write it as #include "{target}"'
+        if own[1] not in LAYERS:
+            return f"there is no layer {own[1]}"
+        if layer is not None and own[1] != layer and own[1] not in LAYERS.get(layer, set()):
+            return f"layer {layer} must not see layer {own[1]}"
+        return None
+    for pattern, folder in THIRD_PARTIES.items():
+        if re.match(pattern, target):
+            return None if path.startswith(f"{folder}/") else f"only {folder} may include it"
+    if quote == "<" and not SYSTEM.fullmatch(target):
+        return "unknown third party; give it one folder and add it to tools/check_layers.py"
+    if quote == '"' and path.startswith("src/"):
+        return 'write it from the include root, as #include "linkwise/..."'
+    return None
+
+
+def check(root: Path) -> list[str]:
+    violations = []
+    for folder in ("src", "bindings", "tests/cpp", "benchmarks"):
+        for file in sorted((root / folder).rglob("*")):
+            if file.suffix not in SUFFIXES:
+                continue
+            path = file.relative_to(root).as_posix()
+            if path.startswith("src/linkwise/") and layer_of(path) not in LAYERS:
+                violations.append(f"{path}: not in one of the layers {', '.join(LAYERS)}")
+            for number, quote, target in includes(file):
+                if problem := check_include(path, quote, target):
+                    violations.append(f"{path}:{number}: {target}: {problem}")
+    return violations
+
+
+def main() -> int:
+    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent
+    violations = check(root)
+    print(*violations, sep="\n", end="\n" if violations else "")
+    print(f"check_layers: {len(violations)} violations")
+    return 1 if violations else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
