@@ -1,5 +1,6 @@
 #include <nanobind/nanobind.h>
 
+#include "bind.hpp"
 #include "linkwise/base/error.hpp"
 
 namespace nb = nanobind;
@@ -14,6 +15,9 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
   m.attr("lanes") = LINKWISE_LANES;
   nb::exception<linkwise::InputError>(m, "InputError", PyExc_ValueError).attr("__module__") =
       "linkwise";
+  linkwise::bindings::bind_model(m);
+  linkwise::bindings::bind_dynamics(m);
+  linkwise::bindings::bind_simulation(m);
 
   m.attr("__name__") = module_name;
 }

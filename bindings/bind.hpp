@@ -1,0 +1,10 @@
+#pragma once
+#include <nanobind/nanobind.h>
+
+namespace linkwise::bindings {
+
+void bind_model(nanobind::module_& m);
+void bind_dynamics(nanobind::module_& m);
+void bind_simulation(nanobind::module_& m);
+
+}  // namespace linkwise::bindings

@@ -1,0 +1,131 @@
+"""linkwise: rigid multibody dynamics in linear time, with the six-component load of every joint.
+
+import linkwise as lw
+
+model = lw.load("arm.urdf")
+run = lw.simulate(model, duration=10, drives={"elbow": lw.PD(kp=100, kd=10, target=1.0)})
+run.joint_load.sel(joint="elbow")
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+# The public names and where they live. They are imported when first used: the command line must
+# answer `--help` without loading NumPy, xarray and the compiled core. No module in this table is
+# called like a public name, because importing a submodule binds its name in the package.
+_PUBLIC = {
+    "InputError": "linkwise._core",
+    "Model": "linkwise._core",
+    "ModelBuilder": "linkwise._core",
+    **dict.fromkeys(
+        (
+            "NumericsError",
+            "ForwardDynamicsResult",
+            "Report",
+            "Note",
+            "forward_dynamics",
+            "inverse_dynamics",
+            "inverse_dynamics_loads",
+            "joint_loads",
+            "mass_matrix",
+            "kinetic_energy",
+            "potential_energy",
+            "momentum",
+            "body_poses",
+            "link_poses",
+            "body_jacobian",
+            "solvers",
+            "methods",
+            "integrators",
+        ),
+        "linkwise._core",
+    ),
+    "load": "linkwise.io.load",
+    "Drive": "linkwise.drives",
+    "Free": "linkwise.drives",
+    "Locked": "linkwise.drives",
+    "PD": "linkwise.drives",
+    "Spring": "linkwise.drives",
+    "Table": "linkwise.drives",
+    "Torque": "linkwise.drives",
+    "Wrench": "linkwise.drives",
+    "Progress": "linkwise.time_loop",
+    "Run": "linkwise.result",
+    "SimulationError": "linkwise.simulation",
+    "SimulationInterrupted": "linkwise.simulation",
+    "open_run": "linkwise.record.read",
+    "simulate": "linkwise.simulation",
+}
+_SUBMODULES = ("drives", "scenes")
+
+__all__ = [
+    "PD",
+    "Drive",
+    "Free",
+    "InputError",
+    "Locked",
+    "Model",
+    "ModelBuilder",
+    "Progress",
+    "Run",
+    "SimulationError",
+    "SimulationInterrupted",
+    "Spring",
+    "Table",
+    "Torque",
+    "Wrench",
+    "drives",
+    "load",
+    "open_run",
+    "scenes",
+    "simulate",
+]
+
+if TYPE_CHECKING:
+    from linkwise import drives, scenes
+    from linkwise._core import (
+        ForwardDynamicsResult,
+        InputError,
+        Model,
+        ModelBuilder,
+        Note,
+        NumericsError,
+        Report,
+        body_jacobian,
+        body_poses,
+        forward_dynamics,
+        integrators,
+        inverse_dynamics,
+        inverse_dynamics_loads,
+        joint_loads,
+        kinetic_energy,
+        link_poses,
+        mass_matrix,
+        methods,
+        momentum,
+        potential_energy,
+        solvers,
+    )
+    from linkwise.drives import PD, Drive, Free, Locked, Spring, Table, Torque, Wrench
+    from linkwise.io.load import load
+    from linkwise.record.read import open_run
+    from linkwise.result import Run
+    from linkwise.simulation import SimulationError, SimulationInterrupted, simulate
+    from linkwise.time_loop import Progress
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PUBLIC:
+        value = getattr(import_module(_PUBLIC[name]), name)
+    elif name in _SUBMODULES:
+        value = import_module(f"linkwise.{name}")
+    else:
+        raise AttributeError(f"module 'linkwise' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,92 @@
+"""Chains of equal rods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from linkwise._core import InputError, make_chain
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
+
+EARTH = (0.0, 0.0, -9.81)
+_PATTERNS = ("alternating", "parallel", "random")
+
+
+def rod_inertia(mass: float, length: float, radius: float) -> np.ndarray:
+    """Central inertia (3, 3) [kg m2] of a solid cylinder along z."""
+    across = mass * (3 * radius**2 + length**2) / 12
+    return np.diag([across, across, mass * radius**2 / 2])
+
+
+def joint_axes(axes: str | ArrayLike, n: int, seed: int) -> np.ndarray:
+    """Axes (k, 3), used in turn: a pattern by name, or the axes themselves."""
+    if not isinstance(axes, str):
+        return np.atleast_2d(np.asarray(axes, dtype=float))
+    if axes == "alternating":
+        return np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    if axes == "parallel":
+        return np.array([[0.0, 1.0, 0.0]])
+    if axes == "random":
+        return np.random.default_rng(seed).normal(size=(n, 3))
+    raise InputError(f"axes {axes!r} is unknown; known: {', '.join(_PATTERNS)}, or an array (k, 3)")
+
+
+def check_count(name: str, n: int, least: int = 1) -> None:
+    """InputError unless ``n`` is a whole number of at least ``least``."""
+    if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < least:
+        raise InputError(f"{name} is {n!r}; give a whole number of at least {least}")
+
+
+def chain(
+    n_bodies: int = 10,
+    *,
+    joint: str = "revolute",
+    axes: str | ArrayLike = "alternating",
+    length: float = 1.0,
+    mass: float = 1.0,
+    radius: float = 0.05,
+    damping: float = 0.0,
+    armature: float = 0.0,
+    gravity: Sequence[float] = EARTH,
+    floating_base: bool = False,
+    seed: int = 0,
+) -> Model:
+    """A chain of equal solid rods that hangs straight down (-z) at q = 0.
+
+    Args:
+        n_bodies: number of rods, 1 to millions; links link_1 ..., joints joint_1 ....
+        joint: type of every joint: revolute, prismatic, spherical, universal, ....
+        axes: joint axes from link to link: "alternating" (y, x, ...), "parallel" (all y), "random",
+            or an array (k, 3) used in turn.
+        length, mass, radius: of one rod [m, kg, m].
+        damping: viscous, per degree of freedom [N m s/rad or N s/m].
+        armature: rotor inertia, per degree of freedom [kg m2 or kg].
+        gravity: (3,) [m/s2].
+        floating_base: the first rod floats instead of being hinged to the ground.
+        seed: of the random axes.
+
+    Raises:
+        InputError: a value is out of range.
+    """
+    check_count("n_bodies", n_bodies)
+    for name, value in (("length", length), ("mass", mass), ("radius", radius)):
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"{name} is {value!r}; give a positive number")
+    return make_chain(
+        n_bodies,
+        joint=joint,
+        axes=joint_axes(axes, n_bodies, seed),
+        translation=(0.0, 0.0, -length),
+        mass=mass,
+        com=(0.0, 0.0, -length / 2),
+        inertia=rod_inertia(mass, length, radius),
+        gravity=gravity,
+        damping=damping,
+        armature=armature,
+        floating_base=floating_base,
+    )

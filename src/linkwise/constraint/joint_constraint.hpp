@@ -1,0 +1,91 @@
+#pragma once
+// What a joint lets through, as the constraint-force system sees it: the wrench it transmits is
+//     w = known + B f,      B = [P^+T of the degrees of freedom with armature | complement of P]
+// known = P^+T tau over the others. A degree of freedom with armature I transmits an unknown torque
+// s = tau - I du, so its row reads P^+ (a_n - X a_p - c) + s / I = tau / I: a compliance 1/I on the
+// diagonal of A keeps the system symmetric and local. Prescribed degrees of freedom are constraints.
+#include <cmath>
+
+#include "linkwise/kinematics/body_state.hpp"
+#include "linkwise/spatial/matrix6.hpp"
+
+namespace linkwise {
+
+struct JointConstraint {
+  int rows = 0;            ///< columns of B, 0 to 6
+  int free = 0;            ///< degrees of freedom
+  int dof[6];              ///< their indices in v
+  Vector6<double> B[6];    ///< column by column
+  double compliance[6];    ///< 1 / armature, or 0
+  int armature_of[6];      ///< column -> degree of freedom index in v, or -1
+  Vector6<double> dual[6]; ///< P^+T: du_i = dual_i . (a_n - X a_p - c)
+};
+
+/// Complement by Householder reflections of the columns of P; n <= 6 of full rank.
+inline void householder_complement(const Motion<double>* P, int n, Vector6<double>* dual, Vector6<double>* complement) {
+  double A[6][6];  // A[j] = column j
+  for (int j = 0; j < n; ++j) {
+    const Vector6<double> column = to_array(P[j]);
+    for (int i = 0; i < 6; ++i) A[j][i] = column[i];
+  }
+  double v[6][6], R[6][6] = {};
+  for (int j = 0; j < n; ++j) {
+    double norm = 0;
+    for (int i = j; i < 6; ++i) norm += A[j][i] * A[j][i];
+    norm = std::sqrt(norm);
+    const double alpha = A[j][j] > 0 ? -norm : norm;
+    double length = 0;
+    for (int i = 0; i < 6; ++i) {
+      v[j][i] = i < j ? 0 : A[j][i] - (i == j ? alpha : 0);
+      length += v[j][i] * v[j][i];
+    }
+    const double k = length > 0 ? 2 / length : 0;
+    for (int i = 0; i < 6; ++i) v[j][i] *= std::sqrt(k);
+    for (int c = j; c < n; ++c) {
+      double s = 0;
+      for (int i = j; i < 6; ++i) s += v[j][i] * A[c][i];
+      for (int i = j; i < 6; ++i) A[c][i] -= s * v[j][i];
+    }
+    for (int c = j; c < n; ++c) R[j][c] = A[c][j];
+  }
+  Vector6<double> Q[6];  // columns of the orthogonal factor
+  for (int c = 0; c < 6; ++c) {
+    for (int i = 0; i < 6; ++i) Q[c][i] = i == c;
+    for (int j = n - 1; j >= 0; --j) {
+      double s = 0;
+      for (int i = 0; i < 6; ++i) s += v[j][i] * Q[c][i];
+      for (int i = 0; i < 6; ++i) Q[c][i] -= s * v[j][i];
+    }
+  }
+  // P^+T = Q1 R^-T: column by column, R^T dual^T = Q1^T.
+  for (int c = 0; c < n; ++c) {
+    dual[c] = Q[c];
+    for (int l = 0; l < c; ++l)
+      for (int i = 0; i < 6; ++i) dual[c][i] -= R[l][c] * dual[l][i];
+    for (int i = 0; i < 6; ++i) dual[c][i] /= R[c][c];
+  }
+  for (int c = n; c < 6; ++c) complement[c - n] = Q[c];
+}
+
+/// P as columns: one for a one-axis joint.
+inline void calc_joint_constraint(const Motion<double>* P, const int* dof, int n, const std::vector<double>& armature,
+                                  JointConstraint& out) {
+  Vector6<double> complement[6];
+  out.free = n;
+  out.rows = 0;
+  householder_complement(P, n, out.dual, complement);
+  for (int i = 0; i < n; ++i) {
+    out.dof[i] = dof[i];
+    if (!(armature[dof[i]] > 0)) continue;
+    out.B[out.rows] = out.dual[i];
+    out.compliance[out.rows] = 1 / armature[dof[i]];
+    out.armature_of[out.rows++] = dof[i];
+  }
+  for (int i = 0; i < 6 - n; ++i) {
+    out.B[out.rows] = complement[i];
+    out.compliance[out.rows] = 0;
+    out.armature_of[out.rows++] = -1;
+  }
+}
+
+}  // namespace linkwise

@@ -1,0 +1,46 @@
+#pragma once
+// Assembles A f = b of [sharf1993, eqs. (10)-(14)] for a tree, and reads motion and loads back from f.
+// With the free accelerations afree_n = M_n^-1 (g_n + known wrenches),
+//     A_nn = B_n^T (M_n^-1 + X_n M_p^-1 X_n^T) B_n + compliance
+//     A_np = -B_n^T X_n M_p^-1 B_p,   A_ns = B_n^T X_n M_p^-1 X_s^T B_s  (siblings: a hub of the block tree)
+//     b_n  = B_n^T (X_n afree_p + c_n - afree_n) + tau / armature
+// Never solves. Bodies enter by their compliance alone.
+#include <vector>
+
+#include "linkwise/constraint/joint_constraint.hpp"
+#include "linkwise/linear/block_tree.hpp"
+
+namespace linkwise {
+
+class TreeSystem {
+ public:
+  /// InputError naming the body when one has a singular inertia.
+  explicit TreeSystem(const Model& model);
+
+  const BlockTree& A() const { return A_; }
+  const std::vector<double>& b() const { return b_; }
+  const std::vector<BodyState<double>>& states() const { return state_; }
+
+  void assemble(const SweepInput<double>& in);
+  /// du [nv] from the solution f; loads [n_joints][6] or null.
+  void recover(const SweepInput<double>& in, const std::vector<double>& f, double* du, double* loads);
+  /// Body of a node of A (they are numbered alike).
+  int body_of_node(int node) const { return node; }
+
+ private:
+  void calc_constraints();
+  void calc_free_accelerations(const SweepInput<double>& in);
+  void assemble_node(int n, const SweepInput<double>& in);
+
+  const Model* model_;
+  BlockTree A_;
+  std::vector<double> b_;
+  std::vector<Compliance<double>> compliance_;
+  std::vector<BodyState<double>> state_;
+  std::vector<GeneralState<double>> general_;
+  std::vector<JointConstraint> joint_;
+  std::vector<Force<double>> known_, g_, w_;
+  std::vector<Motion<double>> a_;
+};
+
+}  // namespace linkwise

@@ -1,0 +1,89 @@
+#include "linkwise/dynamics/forward_dynamics.hpp"
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/dynamics/articulated_body.hpp"
+#include "linkwise/dynamics/composite_rigid_body.hpp"
+#include "linkwise/dynamics/constraint_force.hpp"
+#include "linkwise/solve/registry.hpp"
+
+namespace linkwise {
+namespace {
+
+/// Methods without unknowns of their own: they succeed, or fail at a body.
+template <class Kernel>
+class Recursion : public DynamicsMethod {
+ public:
+  explicit Recursion(const Model& model) : kernel_(model) {}
+  DynamicsReport evaluate(double, const SweepInput<double>& in, double* du, double* loads) override {
+    DynamicsReport report;
+    if (!kernel_.evaluate(in, du, loads)) {
+      report.outcome = Outcome::not_positive_definite;
+      report.body = kernel_.failed_body();
+    }
+    return report;
+  }
+
+ private:
+  Kernel kernel_;
+};
+
+template <class Kernel>
+std::unique_ptr<DynamicsMethod> make_recursion(const Model& model, const DynamicsOptions&) {
+  return std::make_unique<Recursion<Kernel>>(model);
+}
+
+std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model, const DynamicsOptions& options) {
+  return std::make_unique<ConstraintForce>(model, options);
+}
+
+constexpr DynamicsEntry table[] = {
+    {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false, make_recursion<ArticulatedBody<double>>},
+    {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993", true, make_constraint_force},
+    {"composite_rigid_body", "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)", "walker1982", false,
+     make_recursion<CompositeRigidBody>},
+};
+
+}  // namespace
+
+std::span<const DynamicsEntry> dynamics_table() { return table; }
+
+const DynamicsEntry& find_dynamics(std::string_view name) {
+  std::string known = "auto";
+  for (const DynamicsEntry& entry : table) {
+    if (entry.name == name) return entry;
+    known += ", " + std::string(entry.name);
+  }
+  throw InputError("method '" + std::string(name) + "' is unknown; known: " + known);
+}
+
+Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
+  Choice choice{options.method, options.solver, "as asked for"};
+  if (options.solver != "auto") find_solver(options.solver);
+  if (options.method == "auto") {
+    if (options.solver != "auto") {
+      choice.method = "constraint_force";
+      choice.reason = "a solver was asked for, and only constraint_force uses one";
+    } else {
+      choice.method = "articulated_body";
+      choice.reason = model.singular_body() >= 0
+                          ? "body '" + model.body_name(model.singular_body()) + "' has a singular inertia, which only the recursion takes"
+                          : "the recursion is the fastest and the most accurate on one system";
+    }
+  }
+  const DynamicsEntry& entry = find_dynamics(choice.method);
+  if (!entry.uses_solver)
+    choice.solver = "";
+  else if (choice.solver == "auto")
+    choice.solver = "thomas";
+  return choice;
+}
+
+std::unique_ptr<DynamicsMethod> make_dynamics(const Model& model, const DynamicsOptions& options) {
+  const Choice choice = choose_dynamics(model, options);
+  DynamicsOptions resolved = options;
+  resolved.method = choice.method;
+  resolved.solver = choice.solver;
+  return find_dynamics(choice.method).make(model, resolved);
+}
+
+}  // namespace linkwise

@@ -1,0 +1,60 @@
+#pragma once
+// The table of dynamics methods: ways from (q, v, tau) to accelerations and joint loads. A new
+// method is one file and one line; command line, Python, tests and benchmarks follow from the table.
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "linkwise/kinematics/body_state.hpp"
+#include "linkwise/solve/initial_guess.hpp"
+#include "linkwise/solve/solver.hpp"
+
+namespace linkwise {
+
+struct DynamicsOptions {
+  std::string method = "auto";
+  std::string solver = "auto";  ///< for method constraint_force
+  std::string initial_guess = "zero";
+  int history = 8;  ///< solutions kept by the guess "projection"
+  SolverOptions solver_options;
+};
+
+/// What an evaluation reports: the solver's report, and where it failed.
+struct DynamicsReport : Report {
+  int body = -1;  ///< at which it failed
+};
+
+class DynamicsMethod {
+ public:
+  virtual ~DynamicsMethod() = default;
+  /// du [nv]; loads [n_joints][6] or null. t is only used to warm-start iterations.
+  virtual DynamicsReport evaluate(double t, const SweepInput<double>& in, double* du, double* loads) = 0;
+  /// The state at t was accepted by the integrator: warm starts may build on its solution.
+  virtual void accepted(double /*t*/) {}
+  /// Unknowns of the last evaluation; empty for methods without constraint forces.
+  virtual std::span<const double> constraint_force() const { return {}; }
+};
+
+struct DynamicsEntry {
+  std::string_view name;
+  std::string_view description;
+  std::string_view reference;  ///< key in references.bib
+  bool uses_solver;
+  std::unique_ptr<DynamicsMethod> (*make)(const Model&, const DynamicsOptions&);
+};
+
+std::span<const DynamicsEntry> dynamics_table();
+/// InputError, listing the known names, when the name is unknown.
+const DynamicsEntry& find_dynamics(std::string_view name);
+
+/// What "auto" stands for on this model, and why.
+struct Choice {
+  std::string method, solver, reason;
+};
+Choice choose_dynamics(const Model& model, const DynamicsOptions& options);
+
+/// Resolves "auto" and makes the method.
+std::unique_ptr<DynamicsMethod> make_dynamics(const Model& model, const DynamicsOptions& options);
+
+}  // namespace linkwise

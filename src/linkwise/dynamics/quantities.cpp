@@ -1,0 +1,119 @@
+#include "linkwise/dynamics/quantities.hpp"
+
+#include "linkwise/forces/passive.hpp"
+
+namespace linkwise {
+namespace {
+
+/// World -> frame of every element, in element order; the last of a body is the body's frame.
+std::vector<Transform<double>> element_frames(const Model& model, const double* q) {
+  std::vector<Transform<double>> frames(model.elements.size());
+  for (const BodyTopology& body : model.topology) {
+    const BodyTopology* parent = body.parent >= 0 ? &model.topology[body.parent] : nullptr;
+    int previous = parent ? parent->first_element + parent->n_elements - 1 : -1;
+    for (int i = 0; i < body.n_elements; ++i) {
+      const int e = body.first_element + i;
+      const auto X = element_pose(model.elements[e], q);
+      frames[e] = previous >= 0 ? X * frames[previous] : X;
+      previous = e;
+    }
+  }
+  return frames;
+}
+
+void store_pose(const Transform<double>& X, double* pose) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) pose[4 * i + j] = X.R.m[3 * j + i];
+    pose[12 + i] = 0;
+  }
+  pose[3] = X.r.x;
+  pose[7] = X.r.y;
+  pose[11] = X.r.z;
+  pose[15] = 1;
+}
+
+Transform<double> joint_frame(const JointInfo& joint, const std::vector<Transform<double>>& frames) {
+  const auto& X = frames[joint.first_element + joint.n_elements - 1];
+  return {joint.to_user * X.R, X.r};
+}
+
+std::vector<BodyState<double>> states_of(const Model& model, const double* q, const double* v) {
+  std::vector<BodyState<double>> states(model.n_bodies());
+  std::vector<GeneralState<double>> general(model.n_general);
+  SweepInput<double> in;
+  in.q = q;
+  in.v = v;
+  calc_body_states(model, in, states.data(), general.data());
+  return states;
+}
+
+}  // namespace
+
+void body_poses(const Model& model, const double* q, double* poses) {
+  const auto frames = element_frames(model, q);
+  for (int j = 0; j < model.n_joints(); ++j) store_pose(joint_frame(model.joints[j], frames), poses + 16 * j);
+}
+
+void link_poses(const Model& model, const double* q, double* poses) {
+  const auto frames = element_frames(model, q);
+  for (size_t l = 0; l < model.links.size(); ++l) {
+    const LinkInfo& link = model.links[l];
+    store_pose(link.joint >= 0 ? link.placement * joint_frame(model.joints[link.joint], frames) : link.placement, poses + 16 * l);
+  }
+}
+
+void body_jacobian(const Model& model, const double* q, int joint, double* J) {
+  const int nv = model.nv();
+  for (int i = 0; i < 6 * nv; ++i) J[i] = 0;
+  const JointInfo& info = model.joints[joint];
+  Transform<double> X{info.to_user, {}};
+  int body = info.body, last = info.first_element + info.n_elements - 1;
+  for (;;) {
+    for (int i = last; i >= model.topology[body].first_element; --i) {
+      const Element& e = model.elements[i];
+      for (int k = 0; k < e.nv; ++k) {
+        const Motion<double> c = X * element_column<double>(e, k);
+        const double column[6] = {c.lin.x, c.lin.y, c.lin.z, c.ang.x, c.ang.y, c.ang.z};
+        for (int r = 0; r < 6; ++r) J[r * nv + e.v + k] = column[r];
+      }
+      X = X * element_pose(e, q);
+    }
+    body = model.topology[body].parent;
+    if (body < 0) return;
+    last = model.topology[body].first_element + model.topology[body].n_elements - 1;
+  }
+}
+
+double kinetic_energy(const Model& model, const double* q, const double* v) {
+  const auto states = states_of(model, q, v);
+  double energy = 0;
+  for (int n = 0; n < model.n_bodies(); ++n) energy += 0.5 * dot(states[n].v, model.constants[n].inertia * states[n].v);
+  const auto& armature = model.dof_values(DofProperty::armature);
+  for (int i = 0; i < model.nv(); ++i) energy += 0.5 * armature[i] * v[i] * v[i];
+  return energy;
+}
+
+double potential_energy(const Model& model, const double* q) {
+  const auto frames = element_frames(model, q);
+  double energy = passive_potential(model, q);
+  for (int n = 0; n < model.n_bodies(); ++n) {
+    const auto& X = frames[model.topology[n].first_element + model.topology[n].n_elements - 1];
+    const Inertia<double>& M = model.constants[n].inertia;
+    energy -= dot(model.gravity, M.m * X.r + transpose_times(X.R, M.mc));
+  }
+  return energy;
+}
+
+void momentum(const Model& model, const double* q, const double* v, double* h) {
+  const auto frames = element_frames(model, q);
+  const auto states = states_of(model, q, v);
+  Force<double> total;
+  for (int n = 0; n < model.n_bodies(); ++n) {
+    const auto& X = frames[model.topology[n].first_element + model.topology[n].n_elements - 1];
+    total += transpose_times(X, model.constants[n].inertia * states[n].v);
+  }
+  const double values[6] = {total.lin.x, total.lin.y, total.lin.z, total.ang.x, total.ang.y, total.ang.z};
+  for (int i = 0; i < 6; ++i) h[i] = values[i];
+}
+
+}  // namespace linkwise

@@ -1,0 +1,48 @@
+#include "linkwise/forces/drive.hpp"
+
+namespace linkwise {
+
+void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t, const double* q, const double* v, double* tau) {
+  for (size_t j = 0; j < drives.size(); ++j) {
+    const Drive& drive = drives[j];
+    if (drive.kind == DriveKind::free || drive.kind == DriveKind::locked) continue;
+    const JointInfo& joint = model.joints[j];
+    double values[6], rates[6] = {};
+    if (drive.table) {
+      drive.table->evaluate(t, values);
+      if (drive.kind == DriveKind::pd) drive.table->evaluate(t, rates, 1);
+    } else if (drive.callable) {
+      drive.callable(t, q + joint.q, v + joint.v, values);
+    } else {
+      for (int i = 0; i < joint.nv; ++i) values[i] = drive.value[i];
+    }
+    for (int i = 0; i < joint.nv; ++i)
+      tau[joint.v + i] += drive.kind == DriveKind::pd ? drive.kp * (values[i] - q[joint.q + i]) + drive.kd * (rates[i] - v[joint.v + i])
+                                                      : values[i];
+  }
+}
+
+void add_wrenches(const Model&, const std::vector<Wrench>& wrenches, double t, const double* poses, double* external) {
+  for (const Wrench& wrench : wrenches) {
+    double w[6];
+    if (wrench.table)
+      wrench.table->evaluate(t, w);
+    else if (wrench.callable)
+      wrench.callable(t, w);
+    else
+      std::copy(wrench.value.begin(), wrench.value.end(), w);
+    double* out = external + 6 * wrench.joint;
+    if (!wrench.world) {
+      for (int i = 0; i < 6; ++i) out[i] += w[i];
+      continue;
+    }
+    const double* pose = poses + 16 * wrench.joint;
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) {
+        out[i] += pose[4 * k + i] * w[k];
+        out[3 + i] += pose[4 * k + i] * w[3 + k];
+      }
+  }
+}
+
+}  // namespace linkwise

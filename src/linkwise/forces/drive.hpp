@@ -1,0 +1,38 @@
+#pragma once
+// What acts on the joints and bodies from outside: drives and external wrenches.
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "linkwise/forces/table.hpp"
+#include "linkwise/model/model.hpp"
+
+namespace linkwise {
+
+enum class DriveKind { free, torque, torque_table, torque_callable, pd, locked };
+
+struct Drive {
+  DriveKind kind = DriveKind::free;
+  std::vector<double> value;  ///< torque, or target of pd; one a degree of freedom
+  std::optional<Table> table;
+  /// (t, q of the joint, v of the joint, out): torque of the joint.
+  std::function<void(double, const double*, const double*, double*)> callable;
+  double kp = 0, kd = 0;  ///< N m/rad and N m s/rad, or N/m and N s/m
+};
+
+struct Wrench {
+  int joint = 0;  ///< the body is this joint's child
+  bool world = true;
+  std::vector<double> value;
+  std::optional<Table> table;
+  std::function<void(double, double*)> callable;
+};
+
+/// One drive a joint; adds their torques to tau [nv]. A locked joint gets none: its motion is given.
+/// pd: kp (target - q) + kd (dtarget/dt - v), for joints whose coordinates are angles and distances.
+void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t, const double* q, const double* v, double* tau);
+
+/// Adds the wrenches to external [n_joints][6], in the joints' outboard frames.
+void add_wrenches(const Model& model, const std::vector<Wrench>& wrenches, double t, const double* poses, double* external);
+
+}  // namespace linkwise

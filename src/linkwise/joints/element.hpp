@@ -1,0 +1,102 @@
+#pragma once
+// One elementary motion of any kind, for the stacks that the general sweep walks element by element:
+// its transform, its columns of the motion subspace (constant in its own frame), and dq/dt.
+#include "linkwise/joints/axis_joints.hpp"
+#include "linkwise/model/model.hpp"
+
+namespace linkwise {
+
+/// Rotation (child axes in parent components)^T of a quaternion x, y, z, w of any nonzero length.
+template <class S>
+LW_INLINE Mat3<S> rotation_to_child(const S* quaternion) {
+  const S x = quaternion[0], y = quaternion[1], z = quaternion[2], w = quaternion[3];
+  const S k = 2.0 / (x * x + y * y + z * z + w * w);
+  return {{1.0 - k * (y * y + z * z), k * (x * y + z * w), k * (x * z - y * w), k * (x * y - z * w),
+           1.0 - k * (x * x + z * z), k * (y * z + x * w), k * (x * z + y * w), k * (y * z - x * w),
+           1.0 - k * (x * x + y * y)}};
+}
+
+/// Previous frame -> this frame; q is the whole configuration.
+template <class S>
+LW_INLINE Transform<S> element_pose(const Element& e, const S* q) {
+  const S* own = q + e.q;
+  switch (e.kind) {
+    case ElementKind::revolute:
+      return RevoluteJoint::pose(e.placement, e.pitch, own[0]);
+    case ElementKind::prismatic:
+      return PrismaticJoint::pose(e.placement, e.pitch, own[0]);
+    case ElementKind::helical:
+      return HelicalJoint::pose(e.placement, e.pitch, own[0]);
+    case ElementKind::spherical:
+      return Transform<S>{rotation_to_child(own), {}} * e.placement;
+    case ElementKind::planar: {
+      S c, s;
+      sincos(own[2], s, c);
+      return Transform<S>{{{c, s, S{}, -s, c, S{}, S{}, S{}, broadcast<S>(1)}}, {own[0], own[1], S{}}} * e.placement;
+    }
+    case ElementKind::floating:
+      return Transform<S>{rotation_to_child(own + 3), {own[0], own[1], own[2]}} * e.placement;
+    case ElementKind::fixed:
+      break;
+  }
+  return PrismaticJoint::pose(e.placement, 0.0, S{});
+}
+
+/// Column k of the motion subspace in the element's own frame.
+template <class S>
+LW_INLINE Motion<S> element_column(const Element& e, int k) {
+  Motion<S> column;
+  const S one = broadcast<S>(1);
+  int component = k;  // floating
+  if (e.kind == ElementKind::revolute || e.kind == ElementKind::helical)
+    component = 5;
+  else if (e.kind == ElementKind::prismatic)
+    component = 2;
+  else if (e.kind == ElementKind::spherical)
+    component = 3 + k;
+  else if (e.kind == ElementKind::planar && k == 2)
+    component = 5;
+  S* parts[6] = {&column.lin.x, &column.lin.y, &column.lin.z, &column.ang.x, &column.ang.y, &column.ang.z};
+  *parts[component] = one;
+  if (e.kind == ElementKind::helical) column.lin.z = broadcast<S>(e.pitch);
+  return column;
+}
+
+/// dq/dt of one element from its rates. Quaternions keep whatever length they have.
+inline void element_position_rate(const Element& e, const double* q, const double* u, double* rate) {
+  q += e.q;
+  u += e.v;
+  rate += e.q;
+  const auto quaternion_rate = [](const double* p, const double* w, double* out) {
+    out[0] = 0.5 * (p[3] * w[0] + p[1] * w[2] - p[2] * w[1]);
+    out[1] = 0.5 * (p[3] * w[1] + p[2] * w[0] - p[0] * w[2]);
+    out[2] = 0.5 * (p[3] * w[2] + p[0] * w[1] - p[1] * w[0]);
+    out[3] = -0.5 * (p[0] * w[0] + p[1] * w[1] + p[2] * w[2]);
+  };
+  switch (e.kind) {
+    case ElementKind::fixed:
+      break;
+    case ElementKind::spherical:
+      quaternion_rate(q, u, rate);
+      break;
+    case ElementKind::planar: {
+      const double c = std::cos(q[2]), s = std::sin(q[2]);
+      rate[0] = c * u[0] - s * u[1];
+      rate[1] = s * u[0] + c * u[1];
+      rate[2] = u[2];
+      break;
+    }
+    case ElementKind::floating: {
+      const Vec3<double> v = transpose_times(rotation_to_child(q + 3), Vec3<double>{u[0], u[1], u[2]});
+      rate[0] = v.x;
+      rate[1] = v.y;
+      rate[2] = v.z;
+      quaternion_rate(q + 3, u + 3, rate + 3);
+      break;
+    }
+    default:
+      rate[0] = u[0];
+  }
+}
+
+}  // namespace linkwise

@@ -1,0 +1,180 @@
+#pragma once
+// The outward pass that every method starts with: for each body the transform from its parent,
+// velocity, velocity-dependent acceleration c and bias wrench
+//     X_n,  v_n = X_n v_p + P_n u_n,  c_n = v_n x (P_n u_n) + ...,  p_n = v_n x* (M_n v_n) - external
+// A stack of elements is walked as if its frames were massless bodies, which gives c_n and the
+// columns of P_n in the body's frame without ever forming dP/dt [featherstone-2008, ch. 4].
+#include "linkwise/joints/element.hpp"
+
+namespace linkwise {
+
+template <class S>
+struct BodyState {
+  Transform<S> X;
+  Motion<S> v, c;
+  Force<S> bias;
+};
+
+/// Motion subspace of a body whose joint is not one plain axis. Prescribed elements are no columns:
+/// their given acceleration is part of c.
+template <class S>
+struct GeneralState {
+  int n = 0;     ///< free degrees of freedom
+  int dof[6];    ///< their indices in v
+  Motion<S> P[6];
+};
+
+/// Inputs of a sweep, lanes interleaved: q[nq], v[nv], tau[nv] of scalars S.
+template <class S>
+struct SweepInput {
+  const S* q = nullptr;
+  const S* v = nullptr;
+  const S* tau = nullptr;
+  /// Wrench on each body at its joint frame, user axes, [n_joints][6]; null: none.
+  const S* external = nullptr;
+  /// Acceleration of prescribed degrees of freedom, [nv]; null: zero.
+  const S* prescribed = nullptr;
+  /// Times the model's gravity; 0 leaves it out.
+  double gravity_factor = 1;
+};
+
+/// Calls f(joint, begin, end) for every run of bodies with equal joints; joint is RevoluteJoint,
+/// PrismaticJoint, HelicalJoint or GeneralJoint. One dispatch a run, none a body.
+struct GeneralJoint {};
+template <class F>
+LW_INLINE void for_runs_base_to_tip(const Model& model, F&& f) {
+  for (const Run& run : model.runs) {
+    if (run.kind == BodyKind::revolute)
+      f(RevoluteJoint{}, run.begin, run.end);
+    else if (run.kind == BodyKind::prismatic)
+      f(PrismaticJoint{}, run.begin, run.end);
+    else if (run.kind == BodyKind::helical)
+      f(HelicalJoint{}, run.begin, run.end);
+    else
+      f(GeneralJoint{}, run.begin, run.end);
+  }
+}
+template <class F>
+LW_INLINE void for_runs_tip_to_base(const Model& model, F&& f) {
+  for (size_t i = model.runs.size(); i-- > 0;) {
+    const Run& run = model.runs[i];
+    if (run.kind == BodyKind::revolute)
+      f(RevoluteJoint{}, run.begin, run.end);
+    else if (run.kind == BodyKind::prismatic)
+      f(PrismaticJoint{}, run.begin, run.end);
+    else if (run.kind == BodyKind::helical)
+      f(HelicalJoint{}, run.begin, run.end);
+    else
+      f(GeneralJoint{}, run.begin, run.end);
+  }
+}
+template <class J>
+inline constexpr bool is_general = std::is_same_v<J, GeneralJoint>;
+
+template <class S>
+void calc_general_state(const Model& model, const BodyTopology& body, const SweepInput<S>& in, const Motion<S>& v_parent,
+                        BodyState<S>& state, GeneralState<S>& general) {
+  Motion<S> v = v_parent, c{};
+  general.n = 0;
+  for (int i = 0; i < body.n_elements; ++i) {
+    const Element& e = model.elements[body.first_element + i];
+    const Transform<S> X = element_pose(e, in.q);
+    state.X = i == 0 ? X : X * state.X;
+    for (int k = 0; k < general.n; ++k) general.P[k] = X * general.P[k];
+    v = X * v;
+    c = X * c;
+    Motion<S> relative{};
+    for (int k = 0; k < e.nv; ++k) {
+      const Motion<S> column = element_column<S>(e, k);
+      const S u = in.v ? in.v[e.v + k] : S{};
+      relative += Motion<S>{u * column.lin, u * column.ang};
+      if (e.prescribed) {
+        const S a = in.prescribed ? in.prescribed[e.v + k] : S{};
+        c += Motion<S>{a * column.lin, a * column.ang};
+      } else {
+        general.dof[general.n] = e.v + k;
+        general.P[general.n++] = column;
+      }
+    }
+    v += relative;
+    c += cross(v, relative);
+  }
+  state.v = v;
+  state.c = c;
+}
+
+/// Wrench of row `joint` of a user array, turned into its body's frame.
+template <class S>
+LW_INLINE Force<S> user_wrench(const S* external, const JointInfo& joint, int index) {
+  const S* w = external + 6 * index;
+  return {transpose_times(joint.to_user, Vec3<S>{w[0], w[1], w[2]}), transpose_times(joint.to_user, Vec3<S>{w[3], w[4], w[5]})};
+}
+
+/// Fills states (and general for bodies of that kind). in.v may be null: resting.
+template <class S>
+void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states, GeneralState<S>* general) {
+  for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+    using J = decltype(joint);
+    for (int n = begin; n < end; ++n) {
+      const BodyTopology& body = model.topology[n];
+      const BodyConstants<double>& k = model.constants[n];
+      BodyState<S>& s = states[n];
+      const Motion<S> v_parent = body.parent >= 0 ? states[body.parent].v : Motion<S>{};
+      if constexpr (is_general<J>) {
+        calc_general_state(model, body, in, v_parent, s, general[body.general]);
+      } else {
+        s.X = J::pose(k.tree, k.pitch, in.q[body.q]);
+        const S u = in.v ? in.v[body.v] : S{};
+        Motion<S> v = s.X * v_parent;
+        J::add_rate(v, k.pitch, u);
+        s.c = J::bias(v, k.pitch, u);
+        s.v = v;
+      }
+      s.bias = cross_dual(s.v, k.inertia * s.v);
+    }
+  });
+  if (!in.external) return;
+  for (int j = 0; j < model.n_joints(); ++j)
+    if (model.joints[j].last_of_body) states[model.joints[j].body].bias -= user_wrench(in.external, model.joints[j], j);
+}
+
+/// Acceleration of the ground: uniform gravity as a_0 = -g.
+template <class S>
+LW_INLINE Motion<S> ground_acceleration(const Model& model, double factor) {
+  return {{broadcast<S>(-factor * model.gravity.x), broadcast<S>(-factor * model.gravity.y), broadcast<S>(-factor * model.gravity.z)}, {}};
+}
+
+/// The acceleration of prescribed degrees of freedom is what was given.
+template <class S>
+LW_INLINE void copy_prescribed(const Model& model, const BodyTopology& body, const SweepInput<S>& in, S* du) {
+  for (int i = 0; i < body.n_elements; ++i) {
+    const Element& e = model.elements[body.first_element + i];
+    if (!e.prescribed) continue;
+    for (int k = 0; k < e.nv; ++k) du[e.v + k] = in.prescribed ? in.prescribed[e.v + k] : S{};
+  }
+}
+
+/// Joint loads in the user's joint frames, [n_joints][6], from wrench(n), body n's in its own frame.
+/// A joint inside a stack carries the same wrench as the body, moved to its own point.
+template <class S, class W>
+void store_joint_loads(const Model& model, const S* q, W&& wrench, S* loads) {
+  for (int j = model.n_joints() - 1; j >= 0; --j) {
+    const JointInfo& joint = model.joints[j];
+    Force<S> w = wrench(joint.body);
+    if (!joint.last_of_body) {
+      const BodyTopology& body = model.topology[joint.body];
+      for (int e = body.first_element + body.n_elements - 1; e >= joint.first_element + joint.n_elements; --e)
+        w = transpose_times(element_pose(model.elements[e], q), w);
+    }
+    const Vec3<S> f = joint.to_user * w.lin, m = joint.to_user * w.ang;
+    S* out = loads + 6 * j;
+    out[0] = f.x;
+    out[1] = f.y;
+    out[2] = f.z;
+    out[3] = m.x;
+    out[4] = m.y;
+    out[5] = m.z;
+  }
+}
+
+}  // namespace linkwise

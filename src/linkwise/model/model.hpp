@@ -1,0 +1,129 @@
+#pragma once
+// The immutable description that every sweep reads: arrays over bodies (parents first), over the
+// elementary motions of their joints, and the names. Built once from a ModelSpec, O(N), no recursion.
+//
+// Two levels of "joint": a user's joint (revolute ... composite) is a stack of elements; a body's
+// inboard connection is the stack of all the joints between it and the nearest inboard body with
+// mass, because a chain of massless links is one composite joint (theory: light links).
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "linkwise/model/spec.hpp"
+#include "linkwise/spatial/inertia.hpp"
+
+namespace linkwise {
+
+enum class ElementKind : std::uint8_t { fixed, revolute, prismatic, helical, spherical, planar, floating };
+
+/// One motion of a joint: a fixed placement after the previous frame, then the motion. Frames are
+/// turned so that the axis of the first three kinds, and the normal of planar, is z.
+struct Element {
+  ElementKind kind = ElementKind::revolute;
+  bool prescribed = false;
+  int q = 0, v = 0;  ///< first index in q and v
+  int nq = 1, nv = 1;
+  int joint = 0;  ///< the user's joint it belongs to
+  double pitch = 0;
+  Transform<double> placement;  ///< previous frame -> this frame at zero
+};
+
+/// How a body is joined, as the sweeps dispatch it: one z element, or anything else.
+enum class BodyKind : std::uint8_t { revolute, prismatic, helical, general };
+
+struct BodyTopology {
+  int parent = -1;  ///< body index, -1: ground
+  BodyKind kind = BodyKind::general;
+  int first_element = 0, n_elements = 0;
+  int q = 0, nq = 0, v = 0, nv = 0;
+  int n_children = 0;
+  bool first_to_give = false;  ///< the first of its siblings that a tip-to-base sweep meets
+  int general = -1;  ///< index among bodies of kind general
+};
+
+template <class C>
+struct BodyConstants {
+  Transform<C> tree;  ///< previous frame -> body frame at zero; what one-element bodies need
+  Inertia<C> inertia;
+  C pitch{}, armature{};
+};
+
+/// Bodies [begin, end) of one kind.
+struct Run {
+  BodyKind kind;
+  int begin, end;
+};
+
+struct JointInfo {
+  std::string name;
+  JointType type;
+  int body;                           ///< the body that its stack belongs to
+  int first_element = 0, n_elements = 0;
+  int q = 0, nq = 0, v = 0, nv = 0;
+  int link;                           ///< child link (index into links)
+  Mat3<double> to_user;               ///< turns components of the last element's frame into the user's joint frame
+  bool last_of_body = true;           ///< its frame is the body's frame
+};
+
+/// Where a link of the file is: on which joint's frame (-1: ground), and how it is placed there.
+struct LinkInfo {
+  std::string name;
+  int joint = -1;
+  Transform<double> placement;  ///< joint's user frame -> link frame
+};
+
+enum class NoteLevel { merge, warning, info };
+struct Note {
+  NoteLevel level;
+  std::string element, text;
+};
+
+class Model {
+ public:
+  /// Validates and builds. Throws InputError naming the element and the remedy.
+  explicit Model(ModelSpec spec);
+
+  const ModelSpec& spec() const { return spec_; }
+  int nq() const { return nq_; }
+  int nv() const { return nv_; }
+  int n_bodies() const { return static_cast<int>(topology.size()); }
+  int n_joints() const { return static_cast<int>(joints.size()); }
+  double total_mass() const { return total_mass_; }
+  /// Index of a joint or throws InputError with the nearest names.
+  int joint_index(const std::string& name) const;
+  int link_index(const std::string& name) const;
+  /// q at the zero position: zeros, quaternions (0, 0, 0, 1).
+  std::vector<double> neutral_configuration() const;
+  /// "of arm.urdf" or "" : the tail of messages about an element of this model.
+  std::string where() const { return spec_.source.empty() ? "" : " of " + spec_.source; }
+  bool has_passive_forces() const { return has_passive_; }
+  /// First body whose 6x6 inertia is singular (index), or -1; the constraint-force form needs none.
+  int singular_body() const { return singular_body_; }
+  std::string body_name(int body) const;
+
+  std::vector<BodyTopology> topology;
+  std::vector<BodyConstants<double>> constants;
+  std::vector<Element> elements;
+  std::vector<Run> runs;
+  std::vector<JointInfo> joints;
+  std::vector<LinkInfo> links;
+  std::vector<Note> notes;
+  /// One array of length nv for each property of dof_property_table.
+  std::array<std::vector<double>, n_dof_properties> dof;
+  const std::vector<double>& dof_values(DofProperty property) const { return dof[static_cast<int>(property)]; }
+  Vec3<double> gravity;
+  int n_general = 0;
+
+ private:
+  friend class ModelAssembly;
+  ModelSpec spec_;
+  int nq_ = 0, nv_ = 0;
+  double total_mass_ = 0;
+  bool has_passive_ = false;
+  int singular_body_ = -1;
+  std::unordered_map<std::string, int> joint_by_name_, link_by_name_;
+};
+
+}  // namespace linkwise

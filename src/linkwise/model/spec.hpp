@@ -1,0 +1,107 @@
+#pragma once
+// What a user says about a machine: links and joints by name, in the user's frames. ModelBuilder
+// collects it; Model::build turns it into the arrays that the sweeps run over.
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "linkwise/spatial/motion.hpp"
+
+namespace linkwise {
+
+enum class JointType {
+  fixed,
+  revolute,
+  continuous,
+  prismatic,
+  helical,
+  cylindrical,
+  universal,
+  spherical,
+  planar,
+  floating,
+  composite,
+};
+
+/// One screw axis of a stack, in the joint frame.
+enum class AxisKind { revolute, prismatic, helical };
+struct AxisSpec {
+  AxisKind kind = AxisKind::revolute;
+  Vec3<double> axis{0, 0, 1};
+  double pitch = 0;  ///< m/rad, helical only
+};
+
+struct LinkSpec {
+  std::string name;
+  double mass = 0;              ///< kg
+  Vec3<double> com;             ///< centre of mass in the link frame, m
+  Sym3<double> inertia;         ///< about the centre of mass, link axes, kg m^2
+};
+
+/// Properties that a joint has once per degree of freedom; one value stands for all of them.
+enum class DofProperty {
+  damping,            ///< N m s/rad or N s/m
+  friction,           ///< Coulomb level, N m or N
+  friction_velocity,  ///< speed below which Coulomb friction is smoothed: level * tanh(u / speed)
+  stiffness,          ///< spring to rest_position, N m/rad or N/m
+  rest_position,
+  armature,           ///< rotor inertia seen at the joint, kg m2 or kg
+  lower,
+  upper,
+  effort,
+  velocity,
+  limit_stiffness,  ///< of the compliant stops at lower and upper; 0: limits exert no force
+  limit_damping,    ///< s/rad or s/m: stop force = limit_stiffness * depth * (1 + limit_damping * speed)
+};
+inline constexpr int n_dof_properties = 12;
+
+struct DofPropertyEntry {
+  const char* name;
+  double fallback;
+  bool infinite_ok, negative_ok;
+};
+inline constexpr double infinity = std::numeric_limits<double>::infinity();
+inline constexpr DofPropertyEntry dof_property_table[n_dof_properties] = {
+    {"damping", 0, false, false},       {"friction", 0, false, false},        {"friction_velocity", 0.01, false, false},
+    {"stiffness", 0, false, false},     {"rest_position", 0, false, true},    {"armature", 0, false, false},
+    {"lower", -infinity, true, true},   {"upper", infinity, true, true},      {"effort", infinity, true, false},
+    {"velocity", infinity, true, false}, {"limit_stiffness", 0, false, false}, {"limit_damping", 0, false, false},
+};
+
+/// Only what differs from the table's fallbacks, so that a million plain joints stay small.
+struct DofValue {
+  DofProperty property;
+  std::vector<double> values;
+};
+
+struct JointSpec {
+  std::string name;
+  JointType type = JointType::revolute;
+  std::string parent, child;
+  Mat3<double> rotation = Mat3<double>::identity();  ///< joint axes in the parent link frame (columns)
+  Vec3<double> translation;                          ///< joint point in the parent link frame, m
+  std::vector<AxisSpec> axes;                        ///< one for the 1-DOF types and planar (its normal)
+  std::vector<DofValue> dof;
+};
+
+struct ModelSpec {
+  std::string name = "model", source;
+  Vec3<double> gravity{0, 0, -9.81};
+  bool floating_base = false;
+  std::string floating_joint = "root_joint";
+  bool keep_fixed = false;
+  std::vector<std::string> prescribed;  ///< joints whose motion is given; see Model
+  std::vector<LinkSpec> links;
+  std::vector<JointSpec> joints;
+};
+
+/// Degrees of freedom of a joint type; a composite has one per axis.
+int joint_dof(const JointSpec& joint);
+const char* joint_type_name(JointType type);
+JointType joint_type_from_name(const std::string& name);
+
+std::string serialize(const ModelSpec& spec);
+ModelSpec deserialize(const std::string& bytes);
+
+}  // namespace linkwise

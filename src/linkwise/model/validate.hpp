@@ -1,0 +1,29 @@
+#pragma once
+// Checks of single elements, before anything is built. Every message is one line: element, file, remedy.
+#include <string>
+#include <vector>
+
+#include "linkwise/model/model.hpp"
+
+namespace linkwise {
+
+/// Throws InputError on non-finite numbers, a negative mass or a clearly negative principal inertia;
+/// adds a warning note on a broken triangle inequality or a vanishing principal inertia.
+void validate_link(const LinkSpec& link, const std::string& where, std::vector<Note>& notes);
+
+/// Throws InputError on non-finite numbers, a placement that is no rotation, or a zero or missing axis;
+/// normalises the axes.
+void validate_joint(JointSpec& joint, const std::string& where);
+
+/// Appends the joint's properties, one value per degree of freedom, to the model's arrays. Throws
+/// InputError on values of the wrong number or sign, or limits that are swapped.
+void append_dof_properties(const JointSpec& joint, const std::string& where,
+                           std::array<std::vector<double>, n_dof_properties>& dof);
+
+/// Principal moments, ascending.
+void principal_moments(const Sym3<double>& I, double out[3]);
+
+/// "; did you mean 'elbow'?" for the nearest of the known names, or a list of some of them.
+std::string suggest(const std::string& name, const std::vector<std::string>& known);
+
+}  // namespace linkwise

@@ -1,0 +1,204 @@
+#include "linkwise/simulate/simulation.hpp"
+
+#include <cmath>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/dynamics/quantities.hpp"
+#include "linkwise/forces/passive.hpp"
+
+namespace linkwise {
+
+Simulation::Simulation(std::shared_ptr<const Model> model, SimulationOptions options)
+    : model_(std::move(model)), options_(std::move(options)), choice_(choose_dynamics(*model_, options_.dynamics)),
+      drives_(model_->n_joints()) {
+  // Made once here so that bad options are refused before anything is written.
+  make_dynamics(*model_, options_.dynamics);
+  make_integrator(options_.integrator, *this, options_.integration);
+}
+
+void Simulation::set_drive(int joint, Drive drive) {
+  const JointInfo& info = model_->joints[joint];
+  if (drive.kind == DriveKind::pd && info.nq != info.nv)
+    throw InputError("joint '" + info.name + "'" + model_->where() + ": a pd drive needs angles or distances, not a quaternion; drive it by torque");
+  drives_[joint] = std::move(drive);
+}
+
+void Simulation::add_wrench(Wrench wrench) {
+  const JointInfo& info = model_->joints[wrench.joint];
+  if (!info.last_of_body)
+    throw InputError("body '" + model_->links[info.link].name + "'" + model_->where() +
+                     " has no mass, so no wrench can act on it; apply it to the next body outboard");
+  wrenches_.push_back(std::move(wrench));
+}
+
+void Simulation::start(double t0, const double* q0, const double* v0) {
+  const Model& m = *model_;
+  ModelSpec spec;
+  for (int j = 0; j < m.n_joints(); ++j) {
+    if (drives_[j].kind != DriveKind::locked) continue;
+    const JointInfo& info = m.joints[j];
+    for (int i = 0; i < info.nv; ++i)
+      if (v0[info.v + i] != 0) throw InputError("joint '" + info.name + "'" + m.where() + " is locked but starts with a rate; start it at rest");
+    if (spec.prescribed.empty()) spec = m.spec();
+    spec.prescribed.push_back(info.name);
+  }
+  any_locked_ = !spec.prescribed.empty();
+  driven_ = any_locked_ ? std::make_unique<const Model>(std::move(spec)) : nullptr;
+  const Model& driven = driven_ ? *driven_ : m;
+  method_ = make_dynamics(driven, options_.dynamics);
+  output_method_ = make_dynamics(driven, options_.dynamics);
+  inverse_ = any_locked_ ? std::make_unique<InverseDynamics<double>>(m) : nullptr;
+  world_wrenches_ = false;
+  for (const Wrench& w : wrenches_) world_wrenches_ |= w.world;
+  tau_.resize(m.nv());
+  du_.resize(m.nv());
+  holding_.resize(m.nv());
+  external_.resize(wrenches_.empty() ? 0 : 6 * m.n_joints());
+  poses_.resize(world_wrenches_ ? 16 * m.n_joints() : 0);
+  y_.assign(q0, q0 + m.nq());
+  y_.insert(y_.end(), v0, v0 + m.nv());
+  for (const Element& e : m.elements) {
+    if (e.kind != ElementKind::spherical && e.kind != ElementKind::floating) continue;
+    const double* p = &y_[e.q + e.nq - 4];
+    const double norm = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+    if (!(norm > 1e-6))
+      throw InputError("joint '" + m.joints[e.joint].name + "'" + m.where() + ": its quaternion has zero length; give x, y, z, w of length 1");
+  }
+  normalise(y_.data());
+  iterations_ = 0;
+  stop_ = pending_ = Stop{};
+  integrator_ = make_integrator(options_.integrator, *this, options_.integration);
+  integrator_->start(t0, y_);
+}
+
+bool Simulation::accelerations(DynamicsMethod& method, double t, const double* q, const double* v, double* du, double* loads) {
+  const Model& m = *model_;
+  std::fill(tau_.begin(), tau_.end(), 0.0);
+  add_drive_torques(m, drives_, t, q, v, tau_.data());
+  SweepInput<double> in;
+  in.q = q;
+  in.v = v;
+  in.tau = tau_.data();
+  if (!wrenches_.empty()) {
+    if (world_wrenches_) body_poses(m, q, poses_.data());
+    std::fill(external_.begin(), external_.end(), 0.0);
+    add_wrenches(m, wrenches_, t, poses_.data(), external_.data());
+    in.external = external_.data();
+  }
+  std::copy(tau_.begin(), tau_.end(), holding_.begin());  // the drives' share, for the record
+  add_passive_forces(m, q, v, tau_.data());
+  const DynamicsReport report = method.evaluate(t, in, du, loads);
+  iterations_ += report.iterations;
+  double sum = 0;
+  for (int i = 0; i < m.nv(); ++i) sum += du[i];
+  if (report.ok() && std::isfinite(sum)) return true;
+  record_failure(t, report, du);
+  return false;
+}
+
+void Simulation::record_failure(double t, const DynamicsReport& report, const double* du) {
+  const Model& m = *model_;
+  pending_.time = t;
+  pending_.joint = -1;
+  Outcome outcome = report.outcome;
+  if (report.ok()) outcome = Outcome::not_finite;
+  for (int j = 0; j < m.n_joints() && pending_.joint < 0; ++j) {
+    const JointInfo& info = m.joints[j];
+    if (report.body >= 0 && info.body == report.body && info.last_of_body) pending_.joint = j;
+    if (report.body < 0)
+      for (int i = 0; i < info.nv; ++i)
+        if (!std::isfinite(du[info.v + i])) pending_.joint = j;
+  }
+  pending_.outcome = std::string(to_string(outcome));
+  pending_.message = std::string(message(outcome)) + "; " + std::string(remedy(outcome));
+}
+
+bool Simulation::evaluate(double t, const double* y, double* ydot) {
+  const double *q = y, *v = y + model_->nq();
+  position_rates(q, v, ydot);
+  return accelerations(*method_, t, q, v, ydot + model_->nq(), nullptr);
+}
+
+void Simulation::position_rates(const double* q, const double* v, double* qdot) {
+  for (const Element& e : model_->elements) element_position_rate(e, q, v, qdot);
+}
+
+void Simulation::normalise(double* y) {
+  for (const Element& e : model_->elements) {
+    if (e.kind != ElementKind::spherical && e.kind != ElementKind::floating) continue;
+    double* p = y + e.q + e.nq - 4;
+    const double norm = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+    for (int i = 0; i < 4; ++i) p[i] /= norm;
+  }
+}
+
+void Simulation::accepted(double t, const double*) { method_->accepted(t); }
+
+bool Simulation::advance(double t, const Sample& sample) {
+  if (!stop_.ok()) return false;
+  while (integrator_->time() < t) {
+    const StepStatus status = integrator_->step(t);
+    if (status == StepStatus::ok) continue;
+    stop_.time = integrator_->time();
+    if ((status == StepStatus::evaluation_failed || status == StepStatus::not_finite) && !pending_.ok()) {
+      stop_ = pending_;
+    } else {
+      stop_.outcome = status == StepStatus::not_finite        ? "not_finite"
+                      : status == StepStatus::step_too_small ? "step_too_small"
+                      : status == StepStatus::too_many_steps ? "too_many_steps"
+                                                             : "evaluation_failed";
+      stop_.message = std::string(describe(status));
+      if (!pending_.ok()) stop_.joint = pending_.joint;
+    }
+    return false;
+  }
+  integrator_->interpolate(t, y_);
+  return write_sample(t, sample);
+}
+
+bool Simulation::write_sample(double t, const Sample& s) {
+  const Model& m = *model_;
+  const double *q = y_.data(), *v = y_.data() + m.nq();
+  if (s.position) std::copy(q, q + m.nq(), s.position);
+  if (s.velocity) std::copy(v, v + m.nv(), s.velocity);
+  if (s.acceleration || s.joint_load || s.drive_torque) {
+    const long iterations = iterations_;
+    const bool ok = accelerations(*output_method_, t, q, v, du_.data(), s.joint_load);
+    iterations_ = iterations;  // those of the record are not the integration's
+    if (!ok) {
+      stop_ = pending_;
+      return false;
+    }
+    output_method_->accepted(t);
+    if (s.acceleration) std::copy(du_.begin(), du_.end(), s.acceleration);
+    if (s.drive_torque) {
+      std::copy(holding_.begin(), holding_.end(), s.drive_torque);
+      if (any_locked_) {
+        // What holds a locked joint: the torque of the motion less what the joint does by itself.
+        SweepInput<double> in;
+        in.q = q;
+        in.v = v;
+        in.external = wrenches_.empty() ? nullptr : external_.data();
+        std::vector<double> total(m.nv());
+        inverse_->evaluate(in, du_.data(), total.data(), nullptr);
+        for (int j = 0; j < m.n_joints(); ++j) {
+          if (drives_[j].kind != DriveKind::locked) continue;
+          const JointInfo& info = m.joints[j];
+          for (int i = info.v; i < info.v + info.nv; ++i) s.drive_torque[i] = total[i] - (tau_[i] - holding_[i]);
+        }
+      }
+    }
+  }
+  if (s.kinetic_energy) *s.kinetic_energy = kinetic_energy(m, q, v);
+  if (s.potential_energy) *s.potential_energy = potential_energy(m, q);
+  return true;
+}
+
+SimulationStatistics Simulation::statistics() const {
+  SimulationStatistics out;
+  if (integrator_) static_cast<IntegratorStatistics&>(out) = integrator_->statistics();
+  out.iterations = iterations_;
+  return out;
+}
+
+}  // namespace linkwise

@@ -1,0 +1,84 @@
+#pragma once
+// The time loop: drives, dynamics and integrator, sampled at the times asked for. Free of Python
+// apart from user callables.
+#include <memory>
+#include <string>
+
+#include "linkwise/dynamics/forward_dynamics.hpp"
+#include "linkwise/dynamics/inverse_dynamics.hpp"
+#include "linkwise/forces/drive.hpp"
+#include "linkwise/integrate/integrator.hpp"
+
+namespace linkwise {
+
+struct SimulationOptions {
+  DynamicsOptions dynamics;
+  IntegratorKind integrator = IntegratorKind::adams;
+  IntegratorOptions integration;
+};
+
+/// Where one sample goes; null pointers are not computed.
+struct Sample {
+  double *position = nullptr, *velocity = nullptr, *acceleration = nullptr, *joint_load = nullptr, *drive_torque = nullptr;
+  double *kinetic_energy = nullptr, *potential_energy = nullptr;
+};
+
+struct SimulationStatistics : IntegratorStatistics {
+  long iterations = 0;
+};
+
+/// Why a run stopped early.
+struct Stop {
+  std::string outcome = "converged";
+  double time = 0;
+  int joint = -1;
+  std::string message;
+  bool ok() const { return outcome == "converged"; }
+};
+
+class Simulation : private OdeSystem {
+ public:
+  Simulation(std::shared_ptr<const Model> model, SimulationOptions options);
+
+  const Model& model() const { return *model_; }
+  void set_drive(int joint, Drive drive);
+  void add_wrench(Wrench wrench);
+
+  /// Fixes the drives and starts at t0. Rates of locked joints must be zero.
+  void start(double t0, const double* q0, const double* v0);
+
+  /// Steps until t is covered, then writes the sample there. False when the run stopped: see stop().
+  bool advance(double t, const Sample& sample);
+
+  const Stop& stop() const { return stop_; }
+  SimulationStatistics statistics() const;
+  const Choice& choice() const { return choice_; }
+
+ private:
+  int size() const override { return model_->nq() + model_->nv(); }
+  int position_size() const override { return model_->nq(); }
+  bool evaluate(double t, const double* y, double* ydot) override;
+  void position_rates(const double* q, const double* v, double* qdot) override;
+  void normalise(double* y) override;
+  void accepted(double t, const double* y) override;
+
+  bool accelerations(DynamicsMethod& method, double t, const double* q, const double* v, double* du, double* loads);
+  void record_failure(double t, const DynamicsReport& report, const double* du);
+  bool write_sample(double t, const Sample& sample);
+
+  std::shared_ptr<const Model> model_;   ///< as the user sees it
+  std::unique_ptr<const Model> driven_;  ///< the same with locked joints prescribed, or null
+  SimulationOptions options_;
+  Choice choice_;
+  std::vector<Drive> drives_;
+  std::vector<Wrench> wrenches_;
+  bool world_wrenches_ = false, any_locked_ = false;
+  std::unique_ptr<DynamicsMethod> method_, output_method_;
+  std::unique_ptr<InverseDynamics<double>> inverse_;
+  std::unique_ptr<Integrator> integrator_;
+  std::vector<double> tau_, external_, poses_, y_, du_, holding_;
+  long iterations_ = 0;
+  Stop stop_, pending_;
+};
+
+}  // namespace linkwise

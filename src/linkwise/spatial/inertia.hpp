@@ -1,0 +1,112 @@
+#pragma once
+// Rigid-body and articulated-body inertias in packed form [featherstone-2008, ch. 2 and 7].
+#include "linkwise/spatial/motion.hpp"
+
+namespace linkwise {
+
+/// Inertia about the frame's origin: mass, first moment m c, rotational inertia.
+template <class C>
+struct Inertia {
+  C m{};
+  Vec3<C> mc;
+  Sym3<C> I;
+};
+
+/// Momentum h = M v = (m v + w x mc, mc x v + I w).
+template <class C, class S>
+LW_INLINE Force<Wider<C, S>> operator*(const Inertia<C>& M, const Motion<S>& v) {
+  return {M.m * v.lin + cross(v.ang, M.mc), cross(M.mc, v.lin) + M.I * v.ang};
+}
+
+/// Symmetric 6x6 [A B; B^T C], linear part first.
+template <class S>
+struct ArticulatedInertia {
+  Sym3<S> A;
+  Mat3<S> B;
+  Sym3<S> C;
+};
+
+/// adds a rigid body: A += m 1, B += -mc~, C += I.
+template <class S, class C>
+LW_INLINE void add_inertia(ArticulatedInertia<S>& Y, const Inertia<C>& M) {
+  Y.A.m[0] += M.m;
+  Y.A.m[2] += M.m;
+  Y.A.m[5] += M.m;
+  Y.B.m[1] += M.mc.z;
+  Y.B.m[2] -= M.mc.y;
+  Y.B.m[3] -= M.mc.z;
+  Y.B.m[5] += M.mc.x;
+  Y.B.m[6] += M.mc.y;
+  Y.B.m[7] -= M.mc.x;
+#pragma GCC unroll 6
+  for (int i = 0; i < 6; ++i) Y.C.m[i] += M.I.m[i];
+}
+
+template <class S, class T>
+LW_INLINE Force<Wider<S, T>> operator*(const ArticulatedInertia<S>& Y, const Motion<T>& v) {
+  return {Y.A * v.lin + Y.B * v.ang, transpose_times(Y.B, v.lin) + Y.C * v.ang};
+}
+
+/// adds the outer product -k U U^T of the column U = (lin, ang).
+template <class S>
+LW_INLINE void subtract_outer(ArticulatedInertia<S>& Y, const Force<S>& V, const Force<S>& U) {
+  const S v[6] = {V.lin.x, V.lin.y, V.lin.z, V.ang.x, V.ang.y, V.ang.z};
+  const S u[6] = {U.lin.x, U.lin.y, U.lin.z, U.ang.x, U.ang.y, U.ang.z};
+#pragma GCC unroll 3
+  for (int i = 0; i < 3; ++i) {
+#pragma GCC unroll 3
+    for (int j = 0; j <= i; ++j) {
+      Y.A.m[sym_index(i, j)] -= v[i] * u[j];
+      Y.C.m[sym_index(i, j)] -= v[3 + i] * u[3 + j];
+    }
+#pragma GCC unroll 3
+    for (int j = 0; j < 3; ++j) Y.B.m[3 * i + j] -= v[i] * u[3 + j];
+  }
+}
+
+/// X^T Y X: the inertia seen at the parent frame, B' = R^T B R - A' r~, and with G = B', H = R^T B R:
+/// C' = R^T C R + r~ G - H^T r~.
+template <class S, class T>
+LW_INLINE ArticulatedInertia<Wider<S, T>> transform_to_parent(const Transform<T>& X, const ArticulatedInertia<S>& Y) {
+  using W = Wider<S, T>;
+  const Sym3<W> A = congruence(X.R, Y.A);
+  const Mat3<W> H = congruence(X.R, Y.B);
+  const Sym3<W> C = congruence(X.R, Y.C);
+  const auto& r = X.r;
+  Mat3<W> G;
+#pragma GCC unroll 3
+  for (int i = 0; i < 3; ++i) {
+    const W a0 = A.m[sym_index(i, 0)], a1 = A.m[sym_index(i, 1)], a2 = A.m[sym_index(i, 2)];
+    G.m[3 * i] = H.m[3 * i] - (a1 * r.z - a2 * r.y);
+    G.m[3 * i + 1] = H.m[3 * i + 1] - (a2 * r.x - a0 * r.z);
+    G.m[3 * i + 2] = H.m[3 * i + 2] - (a0 * r.y - a1 * r.x);
+  }
+  ArticulatedInertia<W> out{A, G, C};
+  // Rows of r~ G minus rows of H^T r~, lower triangle only.
+  const auto rg = [&](int i, int j) -> W {
+    return i == 0 ? r.y * G.m[6 + j] - r.z * G.m[3 + j]
+                  : (i == 1 ? r.z * G.m[j] - r.x * G.m[6 + j] : r.x * G.m[3 + j] - r.y * G.m[j]);
+  };
+  const auto hr = [&](int i, int j) -> W {
+    const W e0 = H.m[i], e1 = H.m[3 + i], e2 = H.m[6 + i];
+    return j == 0 ? e1 * r.z - e2 * r.y : (j == 1 ? e2 * r.x - e0 * r.z : e0 * r.y - e1 * r.x);
+  };
+#pragma GCC unroll 3
+  for (int i = 0; i < 3; ++i)
+#pragma GCC unroll 3
+    for (int j = 0; j <= i; ++j) out.C.m[sym_index(i, j)] += rg(i, j) - hr(i, j);
+  return out;
+}
+
+template <class S>
+LW_INLINE void operator+=(ArticulatedInertia<S>& a, const ArticulatedInertia<S>& b) {
+#pragma GCC unroll 6
+  for (int i = 0; i < 6; ++i) {
+    a.A.m[i] += b.A.m[i];
+    a.C.m[i] += b.C.m[i];
+  }
+#pragma GCC unroll 9
+  for (int i = 0; i < 9; ++i) a.B.m[i] += b.B.m[i];
+}
+
+}  // namespace linkwise

@@ -1,0 +1,98 @@
+#pragma once
+// Dense 6x6 matrices, row-major, and the inverse of a rigid body's inertia, for the places that
+// assemble blocks. Rows and columns are ordered linear first.
+#include <array>
+
+#include "linkwise/spatial/inertia.hpp"
+
+namespace linkwise {
+
+template <class S>
+using Vector6 = std::array<S, 6>;
+template <class S>
+using Matrix6 = std::array<S, 36>;
+
+template <class S>
+LW_INLINE Vector6<S> to_array(const Motion<S>& v) {
+  return {v.lin.x, v.lin.y, v.lin.z, v.ang.x, v.ang.y, v.ang.z};
+}
+template <class S>
+LW_INLINE Vector6<S> to_array(const Force<S>& v) {
+  return {v.lin.x, v.lin.y, v.lin.z, v.ang.x, v.ang.y, v.ang.z};
+}
+template <class S>
+LW_INLINE Motion<S> to_motion(const S* v) {
+  return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+}
+template <class S>
+LW_INLINE Force<S> to_force(const S* v) {
+  return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+}
+
+/// Inverse of a body's 6x6 inertia: [1/m - c~ Ic^-1 c~, c~ Ic^-1; ., Ic^-1], so that a = M^-1 w.
+/// Stored as the symmetric [A B; B^T C]; multiply() takes a wrench to an acceleration.
+template <class C>
+struct Compliance {
+  Sym3<C> A;
+  Mat3<C> B;
+  Sym3<C> C_;
+};
+
+/// Inverse of a symmetric positive definite 3x3 matrix by cofactors.
+inline Sym3<double> inverse(const Sym3<double>& s) {
+  const double a = s.m[0], b = s.m[1], c = s.m[2], d = s.m[3], e = s.m[4], f = s.m[5];
+  const double A = c * f - e * e, B = d * e - b * f, D = b * e - c * d;
+  const double k = 1 / (a * A + b * B + d * D);
+  return {{k * A, k * B, k * (a * f - d * d), k * D, k * (b * d - a * e), k * (a * c - b * b)}};
+}
+
+inline Compliance<double> invert_inertia(const Inertia<double>& M) {
+  const Vec3<double> c = (1 / M.m) * M.mc;
+  Sym3<double> central = M.I;
+  central.m[0] -= M.m * (c.y * c.y + c.z * c.z);
+  central.m[1] += M.m * c.x * c.y;
+  central.m[2] -= M.m * (c.x * c.x + c.z * c.z);
+  central.m[3] += M.m * c.x * c.z;
+  central.m[4] += M.m * c.y * c.z;
+  central.m[5] -= M.m * (c.x * c.x + c.y * c.y);
+  Compliance<double> out;
+  out.C_ = inverse(central);
+  const auto& J = out.C_;
+  const Vec3<double> columns[3] = {{J.m[0], J.m[1], J.m[3]}, {J.m[1], J.m[2], J.m[4]}, {J.m[3], J.m[4], J.m[5]}};
+  for (int j = 0; j < 3; ++j) {
+    const Vec3<double> b = cross(c, columns[j]);
+    out.B.m[j] = b.x;
+    out.B.m[3 + j] = b.y;
+    out.B.m[6 + j] = b.z;
+  }
+  // A = 1/m + (c~ Ic^-1) c~^T: row i of B crossed with c.
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<double> row{out.B.m[3 * i], out.B.m[3 * i + 1], out.B.m[3 * i + 2]};
+    const Vec3<double> a = cross(c, row);
+    const double values[3] = {a.x, a.y, a.z};
+    for (int j = 0; j <= i; ++j) out.A.m[sym_index(i, j)] = values[j] + (i == j ? 1 / M.m : 0);
+  }
+  return out;
+}
+
+template <class C, class S>
+LW_INLINE Motion<Wider<C, S>> operator*(const Compliance<C>& L, const Force<S>& w) {
+  return {L.A * w.lin + L.B * w.ang, transpose_times(L.B, w.lin) + L.C_ * w.ang};
+}
+
+template <class C>
+LW_INLINE Matrix6<C> to_matrix(const Compliance<C>& L) {
+  Matrix6<C> out;
+#pragma GCC unroll 3
+  for (int i = 0; i < 3; ++i)
+#pragma GCC unroll 3
+    for (int j = 0; j < 3; ++j) {
+      out[6 * i + j] = L.A.m[sym_index(i, j)];
+      out[6 * i + 3 + j] = L.B.m[3 * i + j];
+      out[6 * (3 + j) + i] = L.B.m[3 * i + j];
+      out[6 * (3 + i) + 3 + j] = L.C_.m[sym_index(i, j)];
+    }
+  return out;
+}
+
+}  // namespace linkwise
