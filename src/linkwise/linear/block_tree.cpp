@@ -83,6 +83,13 @@ void BlockTree::multiply_hub(const Hub& body, std::span<const double> x,
 
 namespace {
 
+bool is_finite(const Block& block, int rows, int cols) {
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < cols; ++j)
+      if (!std::isfinite(block[6 * i + j])) return false;
+  return true;
+}
+
 void require(bool condition, const char* what, int node) {
   if (!condition) throw std::logic_error("block tree, node " + std::to_string(node) + ": " + what);
 }
@@ -96,6 +103,21 @@ void check_symmetric(const Block& block, int rows, const char* what, int node) {
 }
 
 }  // namespace
+
+bool BlockTree::all_finite() const {
+  for (int i = 0; i < n(); ++i) {
+    if (!is_finite(diag[i], dim[i], dim[i])) return false;
+    if (lever_of[i] >= 0) {
+      if (!is_finite(levers[lever_of[i]], dim[i], 6)) return false;
+    } else if (parent[i] >= 0 && !is_finite(parent_block[i], dim[i], dim[parent[i]])) {
+      return false;
+    }
+  }
+  for (const Hub& body : hubs)
+    if (!is_finite(body.compliance, 6, 6) || !is_finite(body.inboard, dim[body.node], 6))
+      return false;
+  return true;
+}
 
 void BlockTree::check_consistency() const {
   const int count = n();

@@ -52,6 +52,9 @@ struct BlockTree {
   /// y = A x in O(n). x and y must not overlap.
   void multiply(std::span<const double> x, std::span<double> y) const;
 
+  /// Are all blocks in use finite?
+  bool all_finite() const;
+
   /// Throws std::logic_error, naming the node, when the arrays do not fit together or a diagonal
   /// block is not symmetric. For tests: solvers take a consistent tree for granted.
   void check_consistency() const;

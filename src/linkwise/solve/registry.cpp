@@ -4,11 +4,18 @@
 #include <string>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/solve/direct/thomas.hpp"
+#include "linkwise/solve/iterative/conjugate_gradient.hpp"
 
 namespace linkwise {
 namespace {
 
-constexpr std::array<SolverEntry, 0> table{};
+constexpr std::array<SolverEntry, 2> table{{
+    {"thomas", "block elimination, leaf to root; hubs in linear time", SolverKind::direct, false,
+     "golub2013", make_thomas},
+    {"conjugate_gradient", "conjugate gradients with the block diagonal as preconditioner (J-CG)",
+     SolverKind::iterative, true, "sharf1993", make_conjugate_gradient},
+}};
 
 }  // namespace
 

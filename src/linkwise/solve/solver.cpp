@@ -1,8 +1,8 @@
 #include "linkwise/solve/solver.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 
 #include "linkwise/base/error.hpp"
@@ -144,20 +144,21 @@ void LinearSolver::set_tolerance(double relative, double absolute) {
   options_ = changed;
 }
 
+void accumulate(Report& total, const Report& one) {
+  total.iterations += one.iterations;
+  if (!(one.error_estimate <= total.error_estimate)) total.error_estimate = one.error_estimate;
+  if (one.ok() || !total.ok()) return;
+  total.outcome = one.outcome;
+  total.node = one.node;
+}
+
 Report LinearSolver::solve_many(const BlockTree& A, int count, std::span<const double> b,
                                 std::span<double> x) {
   const std::size_t size = static_cast<std::size_t>(A.size());
-  Report worst;
-  for (int k = 0; k < count; ++k) {
-    const Report one = solve(A, b.subspan(k * size, size), x.subspan(k * size, size));
-    worst.iterations += one.iterations;
-    worst.error_estimate = std::max(worst.error_estimate, one.error_estimate);
-    if (!one.ok() && worst.ok()) {
-      worst.outcome = one.outcome;
-      worst.node = one.node;
-    }
-  }
-  return worst;
+  Report total;
+  for (int k = 0; k < count; ++k)
+    accumulate(total, solve(A, b.subspan(k * size, size), x.subspan(k * size, size)));
+  return total;
 }
 
 }  // namespace linkwise

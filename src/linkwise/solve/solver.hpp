@@ -75,6 +75,8 @@ struct SolverOptions {
   int block_size = 0;
   /// Steps of iterative refinement after a direct solve.
   int refinement_steps = 0;
+  /// Direct solvers: estimate the error (a product and a further solve); otherwise it is NaN.
+  bool estimate_error = false;
   /// lagged_thomas: how many iterations a solve may take before the factor is renewed.
   int lag_limit = 8;
 };
@@ -85,12 +87,16 @@ void validate(const SolverOptions& options);
 struct Report {
   Outcome outcome = Outcome::converged;
   int iterations = 0;
-  /// Estimate of ||x* - x||_A / ||x*||_A.
+  /// Estimate of ||x* - x||_A / ||x*||_A; NaN when a direct solver was not asked for it.
   double error_estimate = 0.0;
   /// The node at which a factorisation broke down, or -1.
   int node = -1;
   bool ok() const { return outcome == Outcome::converged; }
 };
+
+/// Adds one solve of several to their common report: the first failure, the sum of the iterations,
+/// the largest error.
+void accumulate(Report& total, const Report& one);
 
 class LinearSolver {
  public:

@@ -1,0 +1,278 @@
+#include "linkwise/linear/scaled_tree.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "linkwise/linear/vector.hpp"
+
+namespace linkwise {
+namespace {
+
+/// C = R R^T of a hub's compliance, R full 6 x 6 with zeros above the diagonal. A direction with no
+/// compliance (a body held by the ground) gives a zero column; a negative one fails.
+bool compliance_root(const Block& compliance, Block& root) {
+  double scale = 0.0;
+  for (int i = 0; i < 6; ++i) scale = std::max(scale, std::abs(compliance[7 * i]));
+  root.fill(0.0);
+  for (int j = 0; j < 6; ++j) {
+    double pivot = compliance[7 * j];
+    for (int k = 0; k < j; ++k) pivot -= root[6 * j + k] * root[6 * j + k];
+    if (!(pivot >= -1e-12 * scale)) return false;
+    if (pivot <= 1e-15 * scale) continue;
+    root[7 * j] = std::sqrt(pivot);
+    for (int i = j + 1; i < 6; ++i) {
+      double sum = compliance[6 * i + j];
+      for (int k = 0; k < j; ++k) sum -= root[6 * i + k] * root[6 * j + k];
+      root[6 * i + j] = sum / root[7 * j];
+    }
+  }
+  return true;
+}
+
+/// out = L^-1 B R, B dim x 6.
+template <int dim>
+void scale_lever(const double* lower, const double* roots, const Block& from, const Block& root,
+                 Block& out) {
+  for (int i = 0; i < dim; ++i)
+    for (int j = 0; j < 6; ++j) {
+      double sum = 0.0;
+      for (int k = j; k < 6; ++k) sum += from[6 * i + k] * root[6 * k + j];
+      out[6 * i + j] = sum;
+    }
+  ldlt_forward_block<dim, 6>(lower, out.data());
+  for (int i = 0; i < dim; ++i)
+    for (int j = 0; j < 6; ++j) out[6 * i + j] *= roots[i];
+}
+
+/// B <- L_i^-1 B L_p^-T.
+template <int rows, int cols>
+LW_INLINE void scale_coupling(const double* lower, const double* roots, const double* parent_lower,
+                              const double* parent_roots, double* b) {
+  ldlt_forward_block<rows, cols>(lower, b);
+#pragma GCC unroll 6
+  for (int i = 0; i < rows; ++i) {
+    ldlt_forward<cols>(parent_lower, b + 6 * i);
+#pragma GCC unroll 6
+    for (int j = 0; j < cols; ++j) b[6 * i + j] *= roots[i] * parent_roots[j];
+  }
+}
+
+}  // namespace
+
+bool ScaledTree::same_structure(const BlockTree& A) const {
+  return parent == A.parent && dim == A.dim && levers.size() == A.levers.size();
+}
+
+void ScaledTree::set_structure(const BlockTree& A) {
+  const int count = A.n();
+  parent = A.parent;
+  dim = A.dim;
+  offset = A.offset;
+  hub = A.hub;
+  lever_of = A.lever_of;
+  only_child.assign(count, -1);
+  for (int i = 0; i < count; ++i)
+    if (parent[i] >= 0 && lever_of[i] < 0) only_child[parent[i]] = i;
+  coupling.resize(count);
+  levers.resize(A.levers.size());
+  hubs.resize(A.hubs.size());
+  for (std::size_t h = 0; h < hubs.size(); ++h) {
+    hubs[h].node = A.hubs[h].node;
+    hubs[h].children = A.hubs[h].children;
+  }
+  lower_.resize(count);
+  roots_.resize(count);
+}
+
+bool ScaledTree::prepare(const BlockTree& A) {
+  if (!same_structure(A)) set_structure(A);
+  const int count = n();
+  for (int i = 0; i < count; ++i) {
+    failed_node_ = i;
+    const int p = lever_of[i] < 0 ? parent[i] : -1;
+    const bool good = with_dims(dim[i], p < 0 ? 0 : dim[p], [&](auto d, auto c) {
+      double* const lower = lower_[i].data();
+      double* const roots = roots_[i].data();
+      pack_lower<d.n>(A.diag[i].data(), lower);
+      const bool positive = ldlt_factor<d.n>(lower);
+#pragma GCC unroll 6
+      for (int k = 0; k < d.n; ++k) roots[k] = std::sqrt(lower[packed(k, k)]);
+      if (p < 0) return positive;
+      coupling[i] = A.parent_block[i];
+      scale_coupling<d.n, c.n>(lower, roots, lower_[p].data(), roots_[p].data(),
+                               coupling[i].data());
+      return positive;
+    });
+    if (!good) return false;
+  }
+  for (std::size_t h = 0; h < hubs.size(); ++h)
+    if (!scale_hub(A, static_cast<int>(h))) return false;
+  failed_node_ = -1;
+  return true;
+}
+
+bool ScaledTree::scale_hub(const BlockTree& A, int h) {
+  Hub& body = hubs[h];
+  Block root;
+  failed_node_ = body.node;
+  if (!compliance_root(A.hubs[h].compliance, root)) return false;
+  const auto scale = [&](int i, const Block& from, Block& out) {
+    with_dim(dim[i], [&](auto d) {
+      scale_lever<d.n>(lower_[i].data(), roots_[i].data(), from, root, out);
+    });
+  };
+  scale(body.node, A.hubs[h].inboard, body.inboard);
+  for (int i : body.children) scale(i, A.levers[lever_of[i]], levers[lever_of[i]]);
+  return true;
+}
+
+void ScaledTree::scale_right_hand_side(std::span<const double> b, std::span<double> scaled) const {
+  for (int i = 0; i < n(); ++i)
+    with_dim(dim[i], [&](auto d) {
+      double local[6];
+      std::copy(b.data() + offset[i], b.data() + offset[i] + d.n, local);
+      ldlt_forward<d.n>(lower_[i].data(), local);
+      for (int k = 0; k < d.n; ++k) scaled[offset[i] + k] = local[k] * roots_[i][k];
+    });
+}
+
+void ScaledTree::scale_solution(std::span<const double> x, std::span<double> scaled) const {
+  for (int i = 0; i < n(); ++i)
+    with_dim(dim[i], [&](auto d) {
+      const double* xi = x.data() + offset[i];
+      for (int k = 0; k < d.n; ++k) {
+        double sum = xi[k];
+        for (int r = k + 1; r < d.n; ++r) sum += lower_[i][packed(r, k)] * xi[r];
+        scaled[offset[i] + k] = sum / roots_[i][k];
+      }
+    });
+}
+
+void ScaledTree::unscale_solution(std::span<const double> scaled, std::span<double> x) const {
+  for (int i = 0; i < n(); ++i)
+    with_dim(dim[i], [&](auto d) {
+      double local[6];
+      for (int k = 0; k < d.n; ++k) local[k] = scaled[offset[i] + k] * roots_[i][k];
+      ldlt_backward<d.n>(lower_[i].data(), local);
+      std::copy(local, local + d.n, x.data() + offset[i]);
+    });
+}
+
+double ScaledTree::solution_norm(std::span<const double> scaled) const {
+  double total = 0.0;
+  for (int i = 0; i < n(); ++i)
+    with_dim(dim[i], [&](auto d) {
+      double local[6];
+      for (int k = 0; k < d.n; ++k) local[k] = scaled[offset[i] + k] * roots_[i][k];
+      ldlt_backward<d.n>(lower_[i].data(), local);
+      for (int k = 0; k < d.n; ++k) total += local[k] * local[k];
+    });
+  return std::sqrt(total);
+}
+
+double ScaledTree::residual_norm(std::span<const double> scaled) const {
+  double total = 0.0;
+  for (int i = 0; i < n(); ++i)
+    with_dim(dim[i], [&](auto d) {
+      double local[6];
+      for (int k = 0; k < d.n; ++k) local[k] = scaled[offset[i] + k] / roots_[i][k];
+      for (int k = 0; k < d.n; ++k) {
+        double sum = local[k];
+        for (int j = 0; j < k; ++j) sum += lower_[i][packed(k, j)] * local[j];
+        total += sum * sum;
+      }
+    });
+  return std::sqrt(total);
+}
+
+template <bool all>
+void ScaledTree::couple_hub(const Hub& body, const double* x, double* y, const char* selected,
+                            char value) const {
+  double sum[6] = {};
+  for (int i : body.children)
+    block_transpose_multiply_add(dim[i], 6, levers[lever_of[i]], x + offset[i], sum);
+  const int p = body.node;
+  if (all || selected[p] == value)
+    block_multiply_add(dim[p], 6, body.inboard, sum, y + offset[p], -1.0);
+  block_transpose_multiply_add(dim[p], 6, body.inboard, x + offset[p], sum, -1.0);
+  for (int i : body.children) {
+    if (!all && selected[i] != value) continue;
+    const Block& lever = levers[lever_of[i]];
+    with_dim(dim[i], [&](auto d) {
+      double others[6];
+      std::copy(sum, sum + 6, others);
+      block_transpose_multiply_add<d.n, 6>(lever.data(), x + offset[i], others, -1.0);
+      block_multiply_add<d.n, 6>(lever.data(), others, y + offset[i], 1.0);
+    });
+  }
+}
+
+template <bool all>
+void ScaledTree::couple(const double* x, double* y, const char* selected, char value) const {
+  const int count = n();
+  for (int i = 0; i < count; ++i) {
+    const int p = lever_of[i] < 0 ? parent[i] : -1;
+    if (p < 0) continue;
+    const bool to_child = all || selected[i] == value;
+    const bool to_parent = all || selected[p] == value;
+    with_dims(dim[i], dim[p], [&](auto r, auto c) {
+      const double* b = coupling[i].data();
+      if (to_child) block_multiply_add<r.n, c.n>(b, x + offset[p], y + offset[i], 1.0);
+      if (to_parent) block_transpose_multiply_add<r.n, c.n>(b, x + offset[i], y + offset[p], 1.0);
+    });
+  }
+  for (const Hub& body : hubs) couple_hub<all>(body, x, y, selected, value);
+}
+
+void ScaledTree::multiply(std::span<const double> x, std::span<double> y) const {
+  std::copy(x.begin(), x.end(), y.begin());
+  couple<true>(x.data(), y.data(), nullptr, 0);
+}
+
+void ScaledTree::add_coupling(std::span<const double> x, std::span<double> y,
+                              std::span<const char> selected, char value) const {
+  couple<false>(x.data(), y.data(), selected.data(), value);
+}
+
+void ScaledTree::hub_sums(std::span<const double> x, std::span<double> sums) const {
+  std::fill(sums.begin(), sums.end(), 0.0);
+  for (std::size_t h = 0; h < hubs.size(); ++h) {
+    double* const sum = sums.data() + 6 * h;
+    const int p = hubs[h].node;
+    for (int i : hubs[h].children)
+      block_transpose_multiply_add(dim[i], 6, levers[lever_of[i]], x.data() + offset[i], sum);
+    block_transpose_multiply_add(dim[p], 6, hubs[h].inboard, x.data() + offset[p], sum, -1.0);
+  }
+}
+
+void ScaledTree::subtract_row(int i, const double* x, const double* sums, double* row) const {
+  const int p = parent[i];
+  if (lever_of[i] >= 0) {
+    // The sum holds the node's own part, which belongs to the diagonal.
+    const Block& lever = levers[lever_of[i]];
+    double others[6];
+    std::copy(sums + 6 * hub[p], sums + 6 * hub[p] + 6, others);
+    block_transpose_multiply_add(dim[i], 6, lever, x + offset[i], others, -1.0);
+    block_multiply_add(dim[i], 6, lever, others, row, -1.0);
+  } else if (p >= 0) {
+    block_multiply_add(dim[i], dim[p], coupling[i], x + offset[p], row, -1.0);
+  }
+  if (const int child = only_child[i]; child >= 0) {
+    block_transpose_multiply_add(dim[child], dim[i], coupling[child], x + offset[child], row, -1.0);
+  } else if (hub[i] >= 0) {
+    const Block& inboard = hubs[hub[i]].inboard;
+    double children[6];
+    std::copy(sums + 6 * hub[i], sums + 6 * hub[i] + 6, children);
+    block_transpose_multiply_add(dim[i], 6, inboard, x + offset[i], children);
+    block_multiply_add(dim[i], 6, inboard, children, row);
+  }
+}
+
+void ScaledTree::update_sums(int i, const double* change, double* sums) const {
+  if (lever_of[i] >= 0)
+    block_transpose_multiply_add(dim[i], 6, levers[lever_of[i]], change, sums + 6 * hub[parent[i]]);
+  if (hub[i] >= 0)
+    block_transpose_multiply_add(dim[i], 6, hubs[hub[i]].inboard, change, sums + 6 * hub[i], -1.0);
+}
+
+}  // namespace linkwise

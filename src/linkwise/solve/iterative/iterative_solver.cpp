@@ -1,0 +1,139 @@
+// The frame around every iteration: scale, iterate, unscale, verify.
+//
+// An iteration sees its own residual, carried along by recurrences, shrink for ever; the true one
+// does not: rounding leaves an error of about epsilon ||x~|| / sqrt(smallest eigenvalue) in the
+// A-norm. Where that may matter, the true residual of the result is formed with the system as given
+// and, if it is not clearly small enough, the correction that it asks for is computed by the same
+// method. The A-norm of that correction *is* the error of the result, measured and not
+// extrapolated.
+
+#include "linkwise/solve/iterative/iterative_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "linkwise/linear/vector.hpp"
+
+namespace linkwise {
+
+int IterativeSolver::default_max_iterations(int size) const { return 10 * size + 100; }
+
+void IterativeSolver::multiply(std::span<const double> x, std::span<double> y) const {
+  if (coordinates_ == Coordinates::block_scaled)
+    scaled_.multiply(x, y);
+  else
+    system_->multiply(x, y);
+}
+
+double IterativeSolver::preconditioned_square(std::span<const double> residual) {
+  return sum_of_squares(residual);
+}
+
+Outcome IterativeSolver::prepare_all(const BlockTree& A) {
+  system_ = &A;
+  failed_node_ = -1;
+  if (coordinates_ == Coordinates::block_scaled && !scaled_.prepare(A)) {
+    failed_node_ = scaled_.failed_node();
+    return A.all_finite() ? Outcome::not_positive_definite : Outcome::not_finite;
+  }
+  const std::size_t size = static_cast<std::size_t>(A.size());
+  for (std::vector<double>* v : {&b_, &x_, &residual_, &correction_}) v->resize(size);
+  return prepare(A);
+}
+
+Report IterativeSolver::solve(const BlockTree& A, std::span<const double> b, std::span<double> x) {
+  const double size_of_b = sum_of_squares(b);
+  Report report;
+  if (!std::isfinite(size_of_b)) {
+    report.outcome = Outcome::not_finite;
+    report.error_estimate = std::numeric_limits<double>::infinity();
+    return report;
+  }
+  if (size_of_b == 0.0) {
+    std::fill(x.begin(), x.end(), 0.0);
+    return report;
+  }
+  if (!std::isfinite(sum_of_squares(x))) std::fill(x.begin(), x.end(), 0.0);
+  report.outcome = prepare_all(A);
+  if (report.ok())
+    report = run(A, b, x);
+  else
+    report.error_estimate = std::numeric_limits<double>::infinity();
+  report.node = failed_node_;
+  finished(report);
+  return report;
+}
+
+Report IterativeSolver::run(const BlockTree& A, std::span<const double> b, std::span<double> x) {
+  const bool is_scaled = coordinates_ == Coordinates::block_scaled;
+  const int limit =
+      options_.max_iterations > 0 ? options_.max_iterations : default_max_iterations(A.size());
+  stop_.start(options_, is_scaled ? &scaled_ : nullptr, limit);
+  if (is_scaled) {
+    scaled_.scale_right_hand_side(b, b_);
+    scaled_.scale_solution(x, x_);
+  } else {
+    std::copy(b.begin(), b.end(), b_.begin());
+    std::copy(x.begin(), x.end(), x_.begin());
+  }
+  stop_.set_right_hand_side(b_);
+  iterate(b_, x_, stop_);
+  if (is_scaled)
+    scaled_.unscale_solution(x_, x);
+  else
+    std::copy(x_.begin(), x_.end(), x.begin());
+
+  Report report{stop_.outcome(), stop_.iterations(), stop_.relative_error(), -1};
+  if (!std::isfinite(sum_of_squares(x))) report.outcome = Outcome::not_finite;
+  if (report.ok() && options_.stop == StopRule::energy_norm && rounding_may_matter(x_))
+    verify(b, x, report);
+  report.iterations = stop_.iterations();
+  return report;
+}
+
+bool IterativeSolver::rounding_may_matter(std::span<const double> x) const {
+  // Nothing is known of the spectrum of D^-1 A when the iteration worked with another
+  // preconditioner.
+  if (coordinates_ == Coordinates::original) return true;
+  constexpr double epsilon = std::numeric_limits<double>::epsilon();
+  const double floor = 10.0 * epsilon * epsilon * sum_of_squares(x) / stop_.smallest_eigenvalue();
+  return floor > 0.01 * stop_.energy_bound() * stop_.energy_bound();
+}
+
+void IterativeSolver::verify(std::span<const double> b, std::span<double> x, Report& report) {
+  const double bound = stop_.energy_bound();
+  const double energy = stop_.solution_energy();
+  const bool is_scaled = coordinates_ == Coordinates::block_scaled;
+  // A correction that takes longer than the solution did is lost in rounding.
+  const int limit = std::min(stop_.iterations_left(), stop_.iterations() + 10);
+  double previous = std::numeric_limits<double>::infinity();
+  while (true) {
+    system_->multiply(x, residual_);
+    subtract_from(b, residual_);
+    if (is_scaled)
+      scaled_.scale_right_hand_side(residual_, b_);
+    else
+      std::copy(residual_.begin(), residual_.end(), b_.begin());
+    const double left = std::max(0.0, preconditioned_square(b_)) / stop_.smallest_eigenvalue();
+    if (left <= bound * bound) return;  // the estimate of the iteration stands
+    std::fill(x_.begin(), x_.end(), 0.0);
+    stop_.start_correction(energy, limit);
+    iterate(b_, x_, stop_);
+    const double measured = std::sqrt(std::max(0.0, dot(b_, x_)));
+    report.error_estimate = energy > 0.0 ? measured / std::sqrt(energy) : measured;
+    if (stop_.outcome() == Outcome::converged && measured <= bound) return;
+    if (stop_.outcome() != Outcome::converged || measured > 0.5 * previous) {
+      report.outcome = Outcome::stagnated;
+      return;
+    }
+    previous = measured;
+    if (is_scaled)
+      scaled_.unscale_solution(x_, correction_);
+    else
+      std::copy(x_.begin(), x_.end(), correction_.begin());
+    add_scaled(1.0, correction_, x);
+  }
+}
+
+}  // namespace linkwise
