@@ -1,12 +1,13 @@
 #pragma once
-// NumPy arrays in and out: float64 rows with any leading axes. Anything else that NumPy can turn into
-// such an array (lists, integers, other strides) is turned; the common case costs no Python call.
+// NumPy arrays in and out: float64 rows with any leading axes. Anything else that NumPy can turn
+// into such an array (lists, integers, other strides) is turned; the common case costs no Python
+// call.
+#include <string>
+#include <vector>
+
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
-
-#include <string>
-#include <vector>
 
 #include "linkwise/base/error.hpp"
 
@@ -30,7 +31,8 @@ inline ArrayIn as_array(nb::handle value, const char* name) {
   if (nb::try_cast(value, array, false)) return array;
   try {
     const nb::object numpy = nb::module_::import_("numpy");
-    const nb::object converted = numpy.attr("array")(value, "dtype"_a = numpy.attr("float64"), "order"_a = "C");
+    const nb::object converted =
+        numpy.attr("array")(value, "dtype"_a = numpy.attr("float64"), "order"_a = "C");
     return nb::cast<ArrayIn>(converted);
   } catch (nb::python_error&) {
     throw InputError(std::string(name) + " is not an array of numbers; give a float64 array");
@@ -58,7 +60,9 @@ struct Argument {
     check_shape();
     data = array.data();
     for (size_t i = 0; i < array.size(); ++i)
-      if (!(data[i] - data[i] == 0)) throw InputError(std::string(name) + " holds a NaN or infinite value at flat index " + std::to_string(i) + "; give finite numbers");
+      if (!(data[i] - data[i] == 0))
+        throw InputError(std::string(name) + " holds a NaN or infinite value at flat index " +
+                         std::to_string(i) + "; give finite numbers");
   }
 
   Shape lead() const {
@@ -71,11 +75,13 @@ struct Argument {
   void check_shape() const {
     const Shape shape = shape_of(array);
     bool ok = shape.size() >= tail.size();
-    for (size_t i = 0; ok && i < tail.size(); ++i) ok = shape[shape.size() - tail.size() + i] == tail[i];
+    for (size_t i = 0; ok && i < tail.size(); ++i)
+      ok = shape[shape.size() - tail.size() + i] == tail[i];
     if (ok) return;
     std::string expected = "(...";
     for (size_t n : tail) expected += ", " + std::to_string(n);
-    throw InputError(std::string(name) + " has shape " + shape_text(shape) + " but shape " + expected + ") is expected");
+    throw InputError(std::string(name) + " has shape " + shape_text(shape) + " but shape " +
+                     expected + ") is expected");
   }
 };
 
@@ -87,8 +93,10 @@ inline Shape broadcast_leading(std::vector<Argument*> arguments) {
   for (Argument* a : arguments) {
     if (!a->given) continue;
     const Shape lead = a->lead();
-    if (first) common = lead;
-    else if (lead != common) same = false;
+    if (first)
+      common = lead;
+    else if (lead != common)
+      same = false;
     first = false;
   }
   if (same) return common;
@@ -100,21 +108,26 @@ inline Shape broadcast_leading(std::vector<Argument*> arguments) {
   for (Argument* a : arguments) {
     if (!a->given) continue;
     const Shape lead = a->lead();
-    shapes += (shapes.empty() ? "" : ", ") + std::string(a->name) + " " + shape_text(shape_of(a->array));
+    shapes +=
+        (shapes.empty() ? "" : ", ") + std::string(a->name) + " " + shape_text(shape_of(a->array));
     for (size_t i = 0; i < lead.size(); ++i) {
       size_t& n = common[common.size() - lead.size() + i];
-      if (n == 1) n = lead[i];
-      else if (lead[i] != 1 && lead[i] != n) ok = false;
+      if (n == 1)
+        n = lead[i];
+      else if (lead[i] != 1 && lead[i] != n)
+        ok = false;
     }
   }
-  if (!ok) throw InputError("the leading axes do not broadcast: " + shapes + "; make them equal or 1");
+  if (!ok)
+    throw InputError("the leading axes do not broadcast: " + shapes + "; make them equal or 1");
   const nb::object numpy = nb::module_::import_("numpy");
   for (Argument* a : arguments) {
     if (!a->given || a->lead() == common) continue;
     nb::list shape;
     for (size_t n : common) shape.append(n);
     for (size_t n : a->tail) shape.append(n);
-    const nb::object wide = numpy.attr("ascontiguousarray")(numpy.attr("broadcast_to")(nb::cast(a->array), nb::tuple(shape)));
+    const nb::object wide = numpy.attr("ascontiguousarray")(
+        numpy.attr("broadcast_to")(nb::cast(a->array), nb::tuple(shape)));
     a->array = nb::cast<ArrayIn>(wide);
     a->data = a->array.data();
   }

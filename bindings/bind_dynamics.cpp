@@ -35,10 +35,15 @@ struct States {
   size_t count;
   std::vector<double> tau_zero;
 
-  States(const Model& m, nb::handle q_, nb::handle v_, nb::handle tau_, const char* tau_name, nb::handle external_)
-      : q("q", {size(m.nq())}, q_), v("v", {size(m.nv())}, v_), tau(tau_name, {size(m.nv())}, tau_),
+  States(const Model& m, nb::handle q_, nb::handle v_, nb::handle tau_, const char* tau_name,
+         nb::handle external_)
+      : q("q", {size(m.nq())}, q_),
+        v("v", {size(m.nv())}, v_),
+        tau(tau_name, {size(m.nv())}, tau_),
         external("external", {size(m.n_joints()), 6}, external_) {
-    if (!q.given) throw InputError("q is missing; give an array of shape (..., " + std::to_string(m.nq()) + ")");
+    if (!q.given)
+      throw InputError("q is missing; give an array of shape (..., " + std::to_string(m.nq()) +
+                       ")");
     lead = broadcast_leading({&q, &v, &tau, &external});
     count = product(lead);
   }
@@ -51,14 +56,18 @@ void check_external(const Model& m, const States& s) {
     for (size_t i = 0; i < s.count; ++i)
       for (int k = 0; k < 6; ++k)
         if (s.external.data[(i * m.n_joints() + j) * 6 + k] != 0)
-          throw InputError("body '" + m.links[m.joints[j].link].name + "'" + m.where() +
-                           " has no mass, so no wrench can act on it; apply it to the next body outboard");
+          throw InputError(
+              "body '" + m.links[m.joints[j].link].name + "'" + m.where() +
+              " has no mass, so no wrench can act on it; apply it to the next body outboard");
   }
 }
 
 std::string failure_text(const Model& m, const PyReport& report, Outcome outcome) {
-  return "method " + report.method + (report.solver.empty() ? "" : " with solver " + report.solver) + ": " + std::string(message(outcome)) +
-         (report.body.empty() ? "" : " at body '" + report.body + "'" + m.where()) + "; " + std::string(remedy(outcome));
+  return "method " + report.method +
+         (report.solver.empty() ? "" : " with solver " + report.solver) + ": " +
+         std::string(message(outcome)) +
+         (report.body.empty() ? "" : " at body '" + report.body + "'" + m.where()) + "; " +
+         std::string(remedy(outcome));
 }
 
 /// tau with the model's passive forces added, one row a system.
@@ -68,7 +77,8 @@ std::vector<double> with_passive(const Model& m, const States& s) {
   for (size_t i = 0; i < s.count; ++i) {
     double* row = tau.data() + i * m.nv();
     if (s.tau.given) std::copy(s.tau.data + i * m.nv(), s.tau.data + (i + 1) * m.nv(), row);
-    add_passive_forces(m, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : rest.data(), row);
+    add_passive_forces(m, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : rest.data(),
+                       row);
   }
   return tau;
 }
@@ -90,8 +100,8 @@ DynamicsOptions dynamics_options(const ForwardOptions& o) {
 }
 
 /// Runs the chosen method on every system; force is [count][unknowns] when wanted.
-Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, const double* tau, double* du, double* loads,
-                   std::vector<double>* force, PyReport& report) {
+Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, const double* tau,
+                   double* du, double* loads, std::vector<double>* force, PyReport& report) {
   Outcome worst = Outcome::converged;
   std::vector<double> zero(m.nv());
   for (size_t i = 0; i < s.count; ++i) {
@@ -100,20 +110,24 @@ Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, cons
     in.v = s.v.given ? s.v.data + i * m.nv() : zero.data();
     in.tau = tau ? tau + i * m.nv() : zero.data();
     in.external = s.external.given ? s.external.data + i * 6 * m.n_joints() : nullptr;
-    const DynamicsReport r = method.evaluate(0, in, du + i * m.nv(), loads ? loads + i * 6 * m.n_joints() : nullptr);
+    const DynamicsReport r =
+        method.evaluate(0, in, du + i * m.nv(), loads ? loads + i * 6 * m.n_joints() : nullptr);
     report.iterations = std::max(report.iterations, r.iterations);
     report.error_estimate = std::max(report.error_estimate, r.error_estimate);
     if (!r.ok()) {
       worst = r.outcome;
       if (r.body >= 0) report.body = m.body_name(r.body);
     }
-    if (force) force->insert(force->end(), method.constraint_force().begin(), method.constraint_force().end());
+    if (force)
+      force->insert(force->end(), method.constraint_force().begin(),
+                    method.constraint_force().end());
   }
   return worst;
 }
 
-nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau, nb::handle external, bool passive,
-                            const std::string& method, const std::string& solver, double tolerance, const std::string& stop,
+nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
+                            nb::handle external, bool passive, const std::string& method,
+                            const std::string& solver, double tolerance, const std::string& stop,
                             int max_iterations, bool full) {
   const Model& m = *self.model;
   States s(m, q, v, tau, "tau", external);
@@ -143,19 +157,23 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
     const nb::gil_scoped_release release;
     const double* total = s.tau.given ? s.tau.data : nullptr;
     if (passive || !total) {
-      if (passive && m.has_passive_forces()) passive_tau = with_passive(m, s);
-      else if (!total) passive_tau.assign(s.count * m.nv(), 0.0);
+      if (passive && m.has_passive_forces())
+        passive_tau = with_passive(m, s);
+      else if (!total)
+        passive_tau.assign(s.count * m.nv(), 0.0);
       if (!passive_tau.empty()) total = passive_tau.data();
     }
     if (other) {
-      outcome = run_method(m, *other, s, total, du.data, loads ? loads->data : nullptr, full ? &force : nullptr, report);
+      outcome = run_method(m, *other, s, total, du.data, loads ? loads->data : nullptr,
+                           full ? &force : nullptr, report);
     } else {
       BatchInput in;
       in.q = s.q.data;
       in.v = s.v.given ? s.v.data : nullptr;
       in.tau = total;
       in.external = s.external.given ? s.external.data : nullptr;
-      const int body = scratch->batch.forward_dynamics(s.count, in, du.data, loads ? loads->data : nullptr);
+      const int body =
+          scratch->batch.forward_dynamics(s.count, in, du.data, loads ? loads->data : nullptr);
       if (body >= 0) {
         outcome = Outcome::not_positive_definite;
         report.body = m.body_name(body);
@@ -180,7 +198,8 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
   return nb::cast(result);
 }
 
-nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external, bool loads) {
+nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle a,
+                            nb::handle external, bool loads) {
   const Model& m = *self.model;
   States s(m, q, v, a, "acceleration", external);
   check_external(m, s);
@@ -192,16 +211,21 @@ nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
   in.v = s.v.given ? s.v.data : nullptr;
   in.du = s.tau.given ? s.tau.data : nullptr;
   in.external = s.external.given ? s.external.data : nullptr;
-  scratch->batch.inverse_dynamics(s.count, in, loads ? nullptr : out.data, loads ? out.data : nullptr);
+  scratch->batch.inverse_dynamics(s.count, in, loads ? nullptr : out.data,
+                                  loads ? out.data : nullptr);
   const nb::gil_scoped_acquire acquire;
   return nb::cast(out.array);
 }
 
-nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau, nb::handle external, bool passive,
-                       const std::string& method, const std::string& solver) {
-  const nb::object result = forward_dynamics(self, q, v, tau, external, passive, method, solver, 1e-12, "energy_norm", 0, true);
+nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
+                       nb::handle external, bool passive, const std::string& method,
+                       const std::string& solver) {
+  const nb::object result = forward_dynamics(self, q, v, tau, external, passive, method, solver,
+                                             1e-12, "energy_norm", 0, true);
   const PyReport& report = nb::cast<PyReport&>(nb::cast<ForwardResult&>(result).report);
-  if (report.outcome != "converged") throw NumericsError("method " + report.method + ": " + report.outcome + (report.body.empty() ? "" : " at body '" + report.body + "'"));
+  if (report.outcome != "converged")
+    throw NumericsError("method " + report.method + ": " + report.outcome +
+                        (report.body.empty() ? "" : " at body '" + report.body + "'"));
   return nb::cast<ForwardResult&>(result).joint_load;
 }
 
@@ -211,7 +235,8 @@ nb::object mass_matrix(const PyModel& self, nb::handle q) {
   NewArray H(s.lead, {size(m.nv()), size(m.nv())});
   PyModel::Lease scratch(self);
   if (!scratch->composite) scratch->composite = std::make_unique<CompositeRigidBody>(m);
-  for (size_t i = 0; i < s.count; ++i) scratch->composite->mass_matrix(s.q.data + i * m.nq(), H.data + i * m.nv() * m.nv());
+  for (size_t i = 0; i < s.count; ++i)
+    scratch->composite->mass_matrix(s.q.data + i * m.nq(), H.data + i * m.nv() * m.nv());
   return nb::cast(H.array);
 }
 
@@ -223,7 +248,8 @@ nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, const Sha
   NewArray out(s.lead, tail);
   const size_t n = product(tail);
   std::vector<double> zero(m.nv());
-  for (size_t i = 0; i < s.count; ++i) f(m, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : zero.data(), out.data + i * n);
+  for (size_t i = 0; i < s.count; ++i)
+    f(m, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : zero.data(), out.data + i * n);
   return s.lead.empty() && tail.empty() ? nb::object(nb::float_(out.data[0])) : nb::cast(out.array);
 }
 
@@ -267,7 +293,8 @@ nb::list integrator_list() {
 }
 
 void bind_results(nb::module_& m) {
-  nb::exception<NumericsError>(m, "NumericsError", PyExc_RuntimeError).attr("__module__") = "linkwise";
+  nb::exception<NumericsError>(m, "NumericsError", PyExc_RuntimeError).attr("__module__") =
+      "linkwise";
   nb::class_<PyReport>(m, "Report", "How an evaluation went.")
       .def_ro("outcome", &PyReport::outcome)
       .def_ro("method", &PyReport::method)
@@ -275,15 +302,19 @@ void bind_results(nb::module_& m) {
       .def_ro("reason", &PyReport::reason, "Why this method and solver.")
       .def_ro("body", &PyReport::body, "Where it failed, or empty.")
       .def_ro("iterations", &PyReport::iterations)
-      .def_ro("error_estimate", &PyReport::error_estimate, "Relative A-norm error of the constraint forces.")
+      .def_ro("error_estimate", &PyReport::error_estimate,
+              "Relative A-norm error of the constraint forces.")
       .def("__repr__", [](const PyReport& r) {
-        return "Report(" + r.outcome + ", method " + r.method + (r.solver.empty() ? "" : ", solver " + r.solver) + ", " +
+        return "Report(" + r.outcome + ", method " + r.method +
+               (r.solver.empty() ? "" : ", solver " + r.solver) + ", " +
                std::to_string(r.iterations) + " iterations)";
       });
   nb::class_<ForwardResult>(m, "ForwardDynamicsResult")
       .def_ro("acceleration", &ForwardResult::acceleration, "(..., nv)")
-      .def_ro("joint_load", &ForwardResult::joint_load, "(..., n_joints, 6), N and N m, joint frame, joint point.")
-      .def_ro("constraint_force", &ForwardResult::constraint_force, "(..., unknowns) of A f = b, or None.")
+      .def_ro("joint_load", &ForwardResult::joint_load,
+              "(..., n_joints, 6), N and N m, joint frame, joint point.")
+      .def_ro("constraint_force", &ForwardResult::constraint_force,
+              "(..., unknowns) of A f = b, or None.")
       .def_ro("report", &ForwardResult::report);
 }
 
@@ -291,22 +322,30 @@ void bind_results(nb::module_& m) {
 
 void bind_dynamics(nb::module_& m) {
   bind_results(m);
-  m.def("forward_dynamics", &forward_dynamics, "model"_a, "q"_a, "v"_a, "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(),
-        "passive"_a = false, "method"_a = "auto", "solver"_a = "auto", "tolerance"_a = 1e-12, "stop"_a = "energy_norm",
+  m.def("forward_dynamics", &forward_dynamics, "model"_a, "q"_a, "v"_a, "tau"_a = nb::none(),
+        nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
+        "solver"_a = "auto", "tolerance"_a = 1e-12, "stop"_a = "energy_norm",
         "max_iterations"_a = 0, "full"_a = false,
-        "Accelerations dv/dt (..., nv) [rad/s2, m/s2] of q (..., nq), v (..., nv), tau (..., nv); leading axes broadcast.\n\n"
-        "external (..., n_bodies, 6): wrench [N, N m] on each body at its joint frame's origin, in that frame, force\n"
-        "first. passive adds the model's damping, friction, springs and stops to tau. method and solver: names as in\n"
-        "linkwise.methods() and linkwise.solvers(), \"auto\" chooses; tolerance, stop and max_iterations concern\n"
-        "iterative solvers. full returns a ForwardDynamicsResult with joint loads, constraint forces and Report.\n"
-        "Raises InputError (a ValueError) on wrong shapes or values, NumericsError when the method fails.");
+        "Accelerations dv/dt (..., nv) [rad/s2, m/s2] of q (..., nq), v (..., nv), tau (..., nv); "
+        "leading axes broadcast.\n\n"
+        "external (..., n_bodies, 6): wrench [N, N m] on each body at its joint frame's origin, in "
+        "that frame, force\n"
+        "first. passive adds the model's damping, friction, springs and stops to tau. method and "
+        "solver: names as in\n"
+        "linkwise.methods() and linkwise.solvers(), \"auto\" chooses; tolerance, stop and "
+        "max_iterations concern\n"
+        "iterative solvers. full returns a ForwardDynamicsResult with joint loads, constraint "
+        "forces and Report.\n"
+        "Raises InputError (a ValueError) on wrong shapes or values, NumericsError when the method "
+        "fails.");
   m.def(
       "inverse_dynamics",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external) {
         return inverse_dynamics(self, q, v, a, external, false);
       },
       "model"_a, "q"_a, "v"_a, "acceleration"_a, nb::kw_only(), "external"_a = nb::none(),
-      "tau (..., nv) [N m, N] that gives the acceleration (..., nv) at q, v: Newton-Euler recursion, armature included.");
+      "tau (..., nv) [N m, N] that gives the acceleration (..., nv) at q, v: Newton-Euler "
+      "recursion, armature included.");
   m.def(
       "inverse_dynamics_loads",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external) {
@@ -314,62 +353,92 @@ void bind_dynamics(nb::module_& m) {
       },
       "model"_a, "q"_a, "v"_a, "acceleration"_a, nb::kw_only(), "external"_a = nb::none(),
       "Joint loads (..., n_joints, 6) of a given motion, frames and signs as in joint_loads.");
-  m.def("joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a, "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(),
-        "passive"_a = false, "method"_a = "auto", "solver"_a = "auto",
-        "Joint loads (..., n_joints, 6) [N, N m] of the motion that tau causes: the wrench that the inboard body exerts on\n"
-        "the outboard body through the joint, at the joint point, in the joint's outboard frame, force first.");
-  m.def("mass_matrix", &mass_matrix, "model"_a, "q"_a, "Joint-space mass matrix (..., nv, nv), armature included.");
+  m.def("joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a, "tau"_a = nb::none(), nb::kw_only(),
+        "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto", "solver"_a = "auto",
+        "Joint loads (..., n_joints, 6) [N, N m] of the motion that tau causes: the wrench that "
+        "the inboard body exerts on\n"
+        "the outboard body through the joint, at the joint point, in the joint's outboard frame, "
+        "force first.");
+  m.def("mass_matrix", &mass_matrix, "model"_a, "q"_a,
+        "Joint-space mass matrix (..., nv, nv), armature included.");
   m.def(
       "kinetic_energy",
       [](const PyModel& self, nb::handle q, nb::handle v) {
-        return map_states(self, q, v, {}, [](const Model& m, const double* q, const double* v, double* out) { *out = kinetic_energy(m, q, v); });
+        return map_states(self, q, v, {},
+                          [](const Model& m, const double* q, const double* v, double* out) {
+                            *out = kinetic_energy(m, q, v);
+                          });
       },
       "model"_a, "q"_a, "v"_a, "Kinetic energy (...) [J], rotors (armature) included.");
   m.def(
       "potential_energy",
       [](const PyModel& self, nb::handle q) {
-        return map_states(self, q, nb::none(), {}, [](const Model& m, const double* q, const double*, double* out) { *out = potential_energy(m, q); });
+        return map_states(self, q, nb::none(), {},
+                          [](const Model& m, const double* q, const double*, double* out) {
+                            *out = potential_energy(m, q);
+                          });
       },
-      "model"_a, "q"_a, "Potential energy (...) [J] of gravity (zero at the world origin), springs and stops.");
+      "model"_a, "q"_a,
+      "Potential energy (...) [J] of gravity (zero at the world origin), springs and stops.");
   m.def(
       "momentum",
       [](const PyModel& self, nb::handle q, nb::handle v) {
-        return map_states(self, q, v, {6}, [](const Model& m, const double* q, const double* v, double* out) { momentum(m, q, v, out); });
+        return map_states(self, q, v, {6},
+                          [](const Model& m, const double* q, const double* v, double* out) {
+                            momentum(m, q, v, out);
+                          });
       },
-      "model"_a, "q"_a, "v"_a, "Linear [kg m/s] and angular [kg m2/s] momentum (..., 6) about the world origin, world axes.");
+      "model"_a, "q"_a, "v"_a,
+      "Linear [kg m/s] and angular [kg m2/s] momentum (..., 6) about the world origin, world "
+      "axes.");
   m.def(
       "body_poses",
       [](const PyModel& self, nb::handle q) {
         return map_states(self, q, nb::none(), {size(self.model->n_joints()), 4, 4},
-                          [](const Model& m, const double* q, const double*, double* out) { body_poses(m, q, out); });
+                          [](const Model& m, const double* q, const double*, double* out) {
+                            body_poses(m, q, out);
+                          });
       },
-      "model"_a, "q"_a, "Poses (..., n_bodies, 4, 4) of the bodies' frames (their joints' outboard frames) in the world.");
+      "model"_a, "q"_a,
+      "Poses (..., n_bodies, 4, 4) of the bodies' frames (their joints' outboard frames) in the "
+      "world.");
   m.def(
       "link_poses",
       [](const PyModel& self, nb::handle q) {
         return map_states(self, q, nb::none(), {self.model->links.size(), 4, 4},
-                          [](const Model& m, const double* q, const double*, double* out) { link_poses(m, q, out); });
+                          [](const Model& m, const double* q, const double*, double* out) {
+                            link_poses(m, q, out);
+                          });
       },
-      "model"_a, "q"_a, "Poses (..., links, 4, 4) of all links of the source, merged ones too, in the world.");
+      "model"_a, "q"_a,
+      "Poses (..., links, 4, 4) of all links of the source, merged ones too, in the world.");
   m.def(
       "body_jacobian",
       [](const PyModel& self, nb::handle q, nb::handle body) {
         int joint = -1;
         if (nb::isinstance<nb::str>(body)) {
-          const LinkInfo& link = self.model->links[self.model->link_index(nb::cast<std::string>(body))];
+          const LinkInfo& link =
+              self.model->links[self.model->link_index(nb::cast<std::string>(body))];
           joint = link.joint;
           if (joint < 0 || self.model->links[self.model->joints[joint].link].name != link.name)
-            throw InputError("link '" + link.name + "' is welded and has no frame of its own; name the body that carries it (Model.notes)");
+            throw InputError("link '" + link.name +
+                             "' is welded and has no frame of its own; name the body that carries "
+                             "it (Model.notes)");
         } else {
           joint = nb::cast<int>(body);
           if (joint < 0 || joint >= self.model->n_joints())
-            throw InputError("body index " + std::to_string(joint) + " is out of range; the model has " + std::to_string(self.model->n_joints()) + " bodies");
+            throw InputError("body index " + std::to_string(joint) +
+                             " is out of range; the model has " +
+                             std::to_string(self.model->n_joints()) + " bodies");
         }
         return map_states(self, q, nb::none(), {6, size(self.model->nv())},
-                          [joint](const Model& m, const double* q, const double*, double* out) { body_jacobian(m, q, joint, out); });
+                          [joint](const Model& m, const double* q, const double*, double* out) {
+                            body_jacobian(m, q, joint, out);
+                          });
       },
       "model"_a, "q"_a, "body"_a,
-      "Jacobian (..., 6, nv) of a body's frame in its own axes, linear first; body: name or index.");
+      "Jacobian (..., 6, nv) of a body's frame in its own axes, linear first; body: name or "
+      "index.");
   m.def("solvers", &solver_list, "The table of linear solvers, as dictionaries.");
   m.def("methods", &method_list, "The table of dynamics methods, as dictionaries.");
   m.def("integrators", &integrator_list, "The table of integrators, as dictionaries.");

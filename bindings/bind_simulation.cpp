@@ -1,7 +1,7 @@
+#include <set>
+
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
-
-#include <set>
 
 #include "arrays.hpp"
 #include "bind.hpp"
@@ -13,20 +13,28 @@ namespace linkwise::bindings {
 namespace {
 
 /// Values over time as piecewise polynomials; cubic ones are SciPy's not-a-knot splines.
-Table make_table(nb::handle times, nb::handle values, const std::string& interpolation, size_t columns) {
+Table make_table(nb::handle times, nb::handle values, const std::string& interpolation,
+                 size_t columns) {
   const ArrayIn t = as_array(times, "times");
   const ArrayIn y = as_array(values, "values");
-  if (t.ndim() != 1 || t.shape(0) < 2) throw InputError("times has shape " + shape_text(shape_of(t)) + "; a table needs at least two times");
+  if (t.ndim() != 1 || t.shape(0) < 2)
+    throw InputError("times has shape " + shape_text(shape_of(t)) +
+                     "; a table needs at least two times");
   const size_t n = t.shape(0);
   const bool flat = y.ndim() == 1 && columns == 1;
   if (!flat && (y.ndim() != 2 || y.shape(1) != columns))
-    throw InputError("values has shape " + shape_text(shape_of(y)) + " but shape (" + std::to_string(n) + ", " + std::to_string(columns) + ") is expected");
-  if (y.shape(0) != n) throw InputError("values has " + std::to_string(y.shape(0)) + " rows but there are " + std::to_string(n) + " times");
+    throw InputError("values has shape " + shape_text(shape_of(y)) + " but shape (" +
+                     std::to_string(n) + ", " + std::to_string(columns) + ") is expected");
+  if (y.shape(0) != n)
+    throw InputError("values has " + std::to_string(y.shape(0)) + " rows but there are " +
+                     std::to_string(n) + " times");
   for (size_t i = 0; i < n * columns; ++i)
-    if (!std::isfinite(y.data()[i])) throw InputError("values is not finite in row " + std::to_string(i / columns));
+    if (!std::isfinite(y.data()[i]))
+      throw InputError("values is not finite in row " + std::to_string(i / columns));
   for (size_t i = 0; i < n; ++i)
     if (!std::isfinite(t.data()[i]) || (i > 0 && !(t.data()[i] > t.data()[i - 1])))
-      throw InputError("times is not increasing at row " + std::to_string(i) + "; sort the table by time and remove repeated times");
+      throw InputError("times is not increasing at row " + std::to_string(i) +
+                       "; sort the table by time and remove repeated times");
   Table table;
   table.breaks.assign(t.data(), t.data() + n);
   table.columns = static_cast<int>(columns);
@@ -34,17 +42,22 @@ Table make_table(nb::handle times, nb::handle values, const std::string& interpo
     table.degree = 1;
     for (size_t i = 0; i + 1 < n; ++i) {
       for (size_t c = 0; c < columns; ++c)
-        table.coefficients.push_back((y.data()[(i + 1) * columns + c] - y.data()[i * columns + c]) / (t.data()[i + 1] - t.data()[i]));
+        table.coefficients.push_back((y.data()[(i + 1) * columns + c] - y.data()[i * columns + c]) /
+                                     (t.data()[i + 1] - t.data()[i]));
       for (size_t c = 0; c < columns; ++c) table.coefficients.push_back(y.data()[i * columns + c]);
     }
     return table;
   }
-  if (interpolation != "cubic") throw InputError("interpolation '" + interpolation + "' is unknown; known: linear, cubic");
+  if (interpolation != "cubic")
+    throw InputError("interpolation '" + interpolation + "' is unknown; known: linear, cubic");
   table.degree = 3;
   const nb::object numpy = nb::module_::import_("numpy");
   const nb::object rows = numpy.attr("reshape")(nb::cast(y), nb::make_tuple(n, columns));
-  const nb::object spline = nb::module_::import_("scipy.interpolate").attr("CubicSpline")(nb::cast(t), rows);
-  const ArrayIn c = as_array(numpy.attr("ascontiguousarray")(numpy.attr("transpose")(spline.attr("c"), nb::make_tuple(1, 0, 2))), "coefficients");
+  const nb::object spline =
+      nb::module_::import_("scipy.interpolate").attr("CubicSpline")(nb::cast(t), rows);
+  const ArrayIn c = as_array(numpy.attr("ascontiguousarray")(numpy.attr("transpose")(
+                                 spline.attr("c"), nb::make_tuple(1, 0, 2))),
+                             "coefficients");
   table.coefficients.assign(c.data(), c.data() + c.size());
   return table;
 }
@@ -52,11 +65,13 @@ Table make_table(nb::handle times, nb::handle values, const std::string& interpo
 std::vector<double> constants(nb::handle value, const char* name, size_t n) {
   const ArrayIn a = as_array(value, name);
   if (a.size() != n && a.size() != 1)
-    throw InputError(std::string(name) + " has shape " + shape_text(shape_of(a)) + " but shape (" + std::to_string(n) + ",) is expected");
+    throw InputError(std::string(name) + " has shape " + shape_text(shape_of(a)) + " but shape (" +
+                     std::to_string(n) + ",) is expected");
   std::vector<double> out(n);
   for (size_t i = 0; i < n; ++i) {
     out[i] = a.data()[a.size() == 1 ? 0 : i];
-    if (!std::isfinite(out[i])) throw InputError(std::string(name) + " is not finite; give finite numbers");
+    if (!std::isfinite(out[i]))
+      throw InputError(std::string(name) + " is not finite; give finite numbers");
   }
   return out;
 }
@@ -70,7 +85,8 @@ void store(nb::handle result, const std::string& who, double* out, size_t n) {
 
 class PySimulation {
  public:
-  PySimulation(const PyModel& owner, SimulationOptions options) : model(owner.model), simulation(owner.model, std::move(options)) {}
+  PySimulation(const PyModel& owner, SimulationOptions options)
+      : model(owner.model), simulation(owner.model, std::move(options)) {}
 
   std::shared_ptr<const Model> model;
   Simulation simulation;
@@ -85,7 +101,8 @@ class PySimulation {
     d.value = constants(values, ("torque of joint '" + name + "'").c_str(), width(j));
     simulation.set_drive(j, std::move(d));
   }
-  void torque_table(const std::string& name, nb::handle times, nb::handle values, const std::string& interpolation) {
+  void torque_table(const std::string& name, nb::handle times, nb::handle values,
+                    const std::string& interpolation) {
     const int j = joint(name);
     Drive d;
     d.kind = DriveKind::torque_table;
@@ -97,9 +114,11 @@ class PySimulation {
     const JointInfo& info = model->joints[j];
     Drive d;
     d.kind = DriveKind::torque_callable;
-    d.callable = [fn, name, nq = info.nq, nv = info.nv](double t, const double* q, const double* v, double* out) {
+    d.callable = [fn, name, nq = info.nq, nv = info.nv](double t, const double* q, const double* v,
+                                                        double* out) {
       const nb::gil_scoped_acquire acquire;
-      store(fn(t, copy_of(q, nq), copy_of(v, nv)), "torque returned for joint '" + name + "'", out, nv);
+      store(fn(t, copy_of(q, nq), copy_of(v, nv)), "torque returned for joint '" + name + "'", out,
+            nv);
     };
     simulation.set_drive(j, std::move(d));
   }
@@ -109,7 +128,8 @@ class PySimulation {
     d.value = constants(target, ("target of joint '" + name + "'").c_str(), width(j));
     simulation.set_drive(j, std::move(d));
   }
-  void pd_table(const std::string& name, double kp, double kd, nb::handle times, nb::handle values, const std::string& interpolation) {
+  void pd_table(const std::string& name, double kp, double kd, nb::handle times, nb::handle values,
+                const std::string& interpolation) {
     const int j = joint(name);
     Drive d = gains(name, kp, kd);
     d.table = make_table(times, values, interpolation, width(j));
@@ -131,11 +151,15 @@ class PySimulation {
   }
 
   Wrench wrench_on(const std::string& body, const std::string& frame) const {
-    if (frame != "world" && frame != "body") throw InputError("frame '" + frame + "' is unknown; known: world, body");
+    if (frame != "world" && frame != "body")
+      throw InputError("frame '" + frame + "' is unknown; known: world, body");
     const LinkInfo& link = model->links[model->link_index(body)];
     if (link.joint < 0 || model->links[model->joints[link.joint].link].name != body)
-      throw InputError("link '" + body + "'" + model->where() + " is welded to another; apply the wrench to '" +
-                       (link.joint < 0 ? std::string("a moving body") : model->links[model->joints[link.joint].link].name) + "'");
+      throw InputError("link '" + body + "'" + model->where() +
+                       " is welded to another; apply the wrench to '" +
+                       (link.joint < 0 ? std::string("a moving body")
+                                       : model->links[model->joints[link.joint].link].name) +
+                       "'");
     Wrench w;
     w.joint = link.joint;
     w.world = frame == "world";
@@ -143,9 +167,12 @@ class PySimulation {
   }
 
   void start(double t0, nb::handle q, nb::handle v) {
-    const Argument q0("q0", {static_cast<size_t>(model->nq())}, q), v0("v0", {static_cast<size_t>(model->nv())}, v);
-    if (!q0.given || q0.array.ndim() != 1) throw InputError("q0 must have shape (" + std::to_string(model->nq()) + ",)");
-    if (!v0.given || v0.array.ndim() != 1) throw InputError("v0 must have shape (" + std::to_string(model->nv()) + ",)");
+    const Argument q0("q0", {static_cast<size_t>(model->nq())}, q),
+        v0("v0", {static_cast<size_t>(model->nv())}, v);
+    if (!q0.given || q0.array.ndim() != 1)
+      throw InputError("q0 must have shape (" + std::to_string(model->nq()) + ",)");
+    if (!v0.given || v0.array.ndim() != 1)
+      throw InputError("v0 must have shape (" + std::to_string(model->nv()) + ",)");
     simulation.start(t0, q0.data, v0.data);
   }
 
@@ -166,7 +193,8 @@ nb::dict PySimulation::advance(nb::handle times_in, const nb::object& quantities
     Shape lead{n};
     return std::make_unique<NewArray>(lead, tail);
   };
-  auto position = column("position", {nq}), velocity = column("velocity", {nv}), acceleration = column("acceleration", {nv});
+  auto position = column("position", {nq}), velocity = column("velocity", {nv}),
+       acceleration = column("acceleration", {nv});
   auto load = column("joint_load", {nj, 6}), torque = column("drive_torque", {nv});
   auto kinetic = column("energy", {}), potential = column("energy", {});
   std::vector<std::array<double, 5>> statistics;
@@ -175,7 +203,9 @@ nb::dict PySimulation::advance(nb::handle times_in, const nb::object& quantities
     const nb::gil_scoped_release release;
     for (; done < n; ++done) {
       Sample s;
-      const auto row = [&](const std::unique_ptr<NewArray>& a, size_t width) { return a ? a->data + done * width : nullptr; };
+      const auto row = [&](const std::unique_ptr<NewArray>& a, size_t width) {
+        return a ? a->data + done * width : nullptr;
+      };
       s.position = row(position, nq);
       s.velocity = row(velocity, nv);
       s.acceleration = row(acceleration, nv);
@@ -185,7 +215,8 @@ nb::dict PySimulation::advance(nb::handle times_in, const nb::object& quantities
       s.potential_energy = row(potential, 1);
       if (!simulation.advance(times.data()[done], s)) break;
       const SimulationStatistics st = simulation.statistics();
-      statistics.push_back({double(st.steps), double(st.evaluations), double(st.iterations), st.last_step, double(st.last_order)});
+      statistics.push_back({double(st.steps), double(st.evaluations), double(st.iterations),
+                            st.last_step, double(st.last_order)});
     }
   }
   const nb::slice head(nb::int_(0), nb::int_(done), nb::int_(1));
@@ -212,23 +243,30 @@ nb::dict PySimulation::advance(nb::handle times_in, const nb::object& quantities
   const Stop& stop = simulation.stop();
   out["outcome"] = stop.outcome;
   out["stop_time"] = stop.ok() ? (done ? times.data()[done - 1] : 0.0) : stop.time;
-  out["stop_joint"] = stop.joint >= 0 ? nb::object(nb::cast(model->joints[stop.joint].name)) : nb::none();
+  out["stop_joint"] =
+      stop.joint >= 0 ? nb::object(nb::cast(model->joints[stop.joint].name)) : nb::none();
   out["message"] = stop.message;
   return out;
 }
 
-SimulationOptions options_of(const std::string& method, const std::string& solver, const std::string& guess, const std::string& stop,
-                             nb::handle solver_tolerance, nb::handle max_iterations, const std::string& integrator, double tolerance,
-                             nb::handle step, nb::handle max_step) {
+SimulationOptions options_of(const std::string& method, const std::string& solver,
+                             const std::string& guess, const std::string& stop,
+                             nb::handle solver_tolerance, nb::handle max_iterations,
+                             const std::string& integrator, double tolerance, nb::handle step,
+                             nb::handle max_step) {
   SimulationOptions o;
-  if (!(tolerance > 0) || !std::isfinite(tolerance)) throw InputError("tolerance must be a positive number; 1e-6 is usual");
+  if (!(tolerance > 0) || !std::isfinite(tolerance))
+    throw InputError("tolerance must be a positive number; 1e-6 is usual");
   o.dynamics.method = method;
   o.dynamics.solver = solver;
   o.dynamics.initial_guess = guess;
   o.dynamics.solver_options.stop = stop_rule_from_name(stop);
-  // The constraint forces perturb the accelerations by as much: a tenth of the step's error [sharf1993].
-  o.dynamics.solver_options.tolerance = solver_tolerance.is_none() ? tolerance / 10 : nb::cast<double>(solver_tolerance);
-  if (!max_iterations.is_none()) o.dynamics.solver_options.max_iterations = nb::cast<int>(max_iterations);
+  // The constraint forces perturb the accelerations by as much: a tenth of the step's error
+  // [sharf1993].
+  o.dynamics.solver_options.tolerance =
+      solver_tolerance.is_none() ? tolerance / 10 : nb::cast<double>(solver_tolerance);
+  if (!max_iterations.is_none())
+    o.dynamics.solver_options.max_iterations = nb::cast<int>(max_iterations);
   o.integrator = find_integrator(integrator).kind;
   o.integration.tolerance = tolerance;
   if (!step.is_none()) o.integration.step = nb::cast<double>(step);
@@ -242,21 +280,32 @@ void bind_simulation(nb::module_& m) {
   nb::class_<PySimulation>(m, "Simulation", "The compiled time loop behind linkwise.simulate.")
       .def(
           "__init__",
-          [](PySimulation* self, const PyModel& model, const std::string& method, const std::string& solver, const std::string& guess,
-             const std::string& stop, nb::object solver_tolerance, nb::object max_iterations, const std::string& integrator,
+          [](PySimulation* self, const PyModel& model, const std::string& method,
+             const std::string& solver, const std::string& guess, const std::string& stop,
+             nb::object solver_tolerance, nb::object max_iterations, const std::string& integrator,
              double tolerance, nb::object step, nb::object max_step, nb::object /*threads*/) {
-            new (self) PySimulation(model, options_of(method, solver, guess, stop, solver_tolerance, max_iterations, integrator, tolerance, step, max_step));
+            new (self) PySimulation(
+                model, options_of(method, solver, guess, stop, solver_tolerance, max_iterations,
+                                  integrator, tolerance, step, max_step));
           },
-          "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto", "initial_guess"_a = "cubic", "stop"_a = "energy_norm",
-          "solver_tolerance"_a = nb::none(), "max_iterations"_a = nb::none(), "integrator"_a = "adams", "tolerance"_a = 1e-6,
+          "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto",
+          "initial_guess"_a = "cubic", "stop"_a = "energy_norm", "solver_tolerance"_a = nb::none(),
+          "max_iterations"_a = nb::none(), "integrator"_a = "adams", "tolerance"_a = 1e-6,
           "step"_a = nb::none(), "max_step"_a = nb::none(), "threads"_a = nb::none())
       .def("drive_torque", &PySimulation::torque, "joint"_a, "values"_a)
-      .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a, "interpolation"_a = "linear")
+      .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a,
+           "interpolation"_a = "linear")
       .def("drive_torque_callable", &PySimulation::torque_callable, "joint"_a, "fn"_a)
       .def("drive_pd", &PySimulation::pd, "joint"_a, "kp"_a, "kd"_a, "target"_a)
-      .def("drive_pd_table", &PySimulation::pd_table, "joint"_a, "kp"_a, "kd"_a, "times"_a, "values"_a, "interpolation"_a = "linear")
-      .def("drive_locked", [](PySimulation& s, const std::string& j) { s.set_kind(j, DriveKind::locked); }, "joint"_a)
-      .def("drive_free", [](PySimulation& s, const std::string& j) { s.set_kind(j, DriveKind::free); }, "joint"_a)
+      .def("drive_pd_table", &PySimulation::pd_table, "joint"_a, "kp"_a, "kd"_a, "times"_a,
+           "values"_a, "interpolation"_a = "linear")
+      .def(
+          "drive_locked",
+          [](PySimulation& s, const std::string& j) { s.set_kind(j, DriveKind::locked); },
+          "joint"_a)
+      .def(
+          "drive_free",
+          [](PySimulation& s, const std::string& j) { s.set_kind(j, DriveKind::free); }, "joint"_a)
       .def(
           "wrench",
           [](PySimulation& s, const std::string& body, nb::object value, const std::string& frame) {
@@ -267,8 +316,8 @@ void bind_simulation(nb::module_& m) {
           "body"_a, "value"_a, "frame"_a = "world")
       .def(
           "wrench_table",
-          [](PySimulation& s, const std::string& body, nb::object times, nb::object values, const std::string& interpolation,
-             const std::string& frame) {
+          [](PySimulation& s, const std::string& body, nb::object times, nb::object values,
+             const std::string& interpolation, const std::string& frame) {
             Wrench w = s.wrench_on(body, frame);
             w.table = make_table(times, values, interpolation, 6);
             s.simulation.add_wrench(std::move(w));

@@ -15,7 +15,8 @@ struct Scratch {
   explicit Scratch(const Model& model) : batch(model) {}
   BatchEvaluator batch;
   std::unique_ptr<CompositeRigidBody> composite;
-  std::map<std::pair<std::string, std::string>, std::unique_ptr<DynamicsMethod>> methods;  ///< default options
+  std::map<std::pair<std::string, std::string>, std::unique_ptr<DynamicsMethod>>
+      methods;  ///< default options
 };
 
 class PyModel {

@@ -3,7 +3,8 @@
 //     w = known + B f,      B = [P^+T of the degrees of freedom with armature | complement of P]
 // known = P^+T tau over the others. A degree of freedom with armature I transmits an unknown torque
 // s = tau - I du, so its row reads P^+ (a_n - X a_p - c) + s / I = tau / I: a compliance 1/I on the
-// diagonal of A keeps the system symmetric and local. Prescribed degrees of freedom are constraints.
+// diagonal of A keeps the system symmetric and local. Prescribed degrees of freedom are
+// constraints.
 #include <cmath>
 
 #include "linkwise/kinematics/body_state.hpp"
@@ -12,17 +13,18 @@
 namespace linkwise {
 
 struct JointConstraint {
-  int rows = 0;            ///< columns of B, 0 to 6
-  int free = 0;            ///< degrees of freedom
-  int dof[6];              ///< their indices in v
-  Vector6<double> B[6];    ///< column by column
-  double compliance[6];    ///< 1 / armature, or 0
-  int armature_of[6];      ///< column -> degree of freedom index in v, or -1
-  Vector6<double> dual[6]; ///< P^+T: du_i = dual_i . (a_n - X a_p - c)
+  int rows = 0;             ///< columns of B, 0 to 6
+  int free = 0;             ///< degrees of freedom
+  int dof[6];               ///< their indices in v
+  Vector6<double> B[6];     ///< column by column
+  double compliance[6];     ///< 1 / armature, or 0
+  int armature_of[6];       ///< column -> degree of freedom index in v, or -1
+  Vector6<double> dual[6];  ///< P^+T: du_i = dual_i . (a_n - X a_p - c)
 };
 
 /// Complement by Householder reflections of the columns of P; n <= 6 of full rank.
-inline void householder_complement(const Motion<double>* P, int n, Vector6<double>* dual, Vector6<double>* complement) {
+inline void householder_complement(const Motion<double>* P, int n, Vector6<double>* dual,
+                                   Vector6<double>* complement) {
   double A[6][6];  // A[j] = column j
   for (int j = 0; j < n; ++j) {
     const Vector6<double> column = to_array(P[j]);
@@ -68,8 +70,8 @@ inline void householder_complement(const Motion<double>* P, int n, Vector6<doubl
 }
 
 /// P as columns: one for a one-axis joint.
-inline void calc_joint_constraint(const Motion<double>* P, const int* dof, int n, const std::vector<double>& armature,
-                                  JointConstraint& out) {
+inline void calc_joint_constraint(const Motion<double>* P, const int* dof, int n,
+                                  const std::vector<double>& armature, JointConstraint& out) {
   Vector6<double> complement[6];
   out.free = n;
   out.rows = 0;

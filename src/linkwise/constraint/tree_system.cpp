@@ -5,11 +5,18 @@
 namespace linkwise {
 
 TreeSystem::TreeSystem(const Model& model)
-    : model_(&model), state_(model.n_bodies()), general_(model.n_general), joint_(model.n_bodies()), known_(model.n_bodies()),
-      g_(model.n_bodies()), w_(model.n_bodies()), a_(model.n_bodies()) {
+    : model_(&model),
+      state_(model.n_bodies()),
+      general_(model.n_general),
+      joint_(model.n_bodies()),
+      known_(model.n_bodies()),
+      g_(model.n_bodies()),
+      w_(model.n_bodies()),
+      a_(model.n_bodies()) {
   if (const int body = model.singular_body(); body >= 0)
     throw InputError("body '" + model.body_name(body) + "'" + model.where() +
-                     " has a singular inertia, which method constraint_force cannot take; give it mass and inertia about every "
+                     " has a singular inertia, which method constraint_force cannot take; give it "
+                     "mass and inertia about every "
                      "axis, or use method articulated_body");
   std::vector<int> parent, dim;
   const auto& armature = model.dof_values(DofProperty::armature);
@@ -40,7 +47,8 @@ void TreeSystem::calc_constraints() {
   for (int n = 0; n < model.n_bodies(); ++n) {
     const int g = model.topology[n].general;
     if (g >= 0)
-      calc_joint_constraint(general_[g].P, general_[g].dof, general_[g].n, model.dof_values(DofProperty::armature), joint_[n]);
+      calc_joint_constraint(general_[g].P, general_[g].dof, general_[g].n,
+                            model.dof_values(DofProperty::armature), joint_[n]);
   }
 }
 
@@ -57,7 +65,8 @@ void TreeSystem::calc_free_accelerations(const SweepInput<double>& in) {
     }
     known_[n] = to_force(known.data());
     g_[n] += known_[n];
-    if (const int parent = model.topology[n].parent; parent >= 0) g_[parent] -= transpose_times(state_[n].X, known_[n]);
+    if (const int parent = model.topology[n].parent; parent >= 0)
+      g_[parent] -= transpose_times(state_[n].X, known_[n]);
   }
   for (int n = 0; n < model.n_bodies(); ++n) a_[n] = compliance_[n] * g_[n];
 }
@@ -94,13 +103,16 @@ void TreeSystem::assemble_node(int n, const SweepInput<double>& in) {
     D[(block_stride + 1) * c] += joint.compliance[c];
   }
 
-  const Motion<double> free_parent = parent >= 0 ? a_[parent] : ground_acceleration<double>(model, in.gravity_factor);
+  const Motion<double> free_parent =
+      parent >= 0 ? a_[parent] : ground_acceleration<double>(model, in.gravity_factor);
   Motion<double> relative = X * free_parent;
   relative += state_[n].c;
   relative += Motion<double>{-a_[n].lin, -a_[n].ang};
   const Vector6<double> gap = to_array(relative);
   for (int r = 0; r < rows; ++r) {
-    double sum = joint.armature_of[r] >= 0 ? in.tau[joint.armature_of[r]] / armature[joint.armature_of[r]] : 0;
+    double sum = joint.armature_of[r] >= 0
+                     ? in.tau[joint.armature_of[r]] / armature[joint.armature_of[r]]
+                     : 0;
     for (int i = 0; i < 6; ++i) sum += joint.B[r][i] * gap[i];
     b_[A_.offset[n] + r] = sum;
   }
@@ -140,7 +152,8 @@ void TreeSystem::assemble(const SweepInput<double>& in) {
   }
 }
 
-void TreeSystem::recover(const SweepInput<double>& in, const std::vector<double>& f, double* du, double* loads) {
+void TreeSystem::recover(const SweepInput<double>& in, const std::vector<double>& f, double* du,
+                         double* loads) {
   const Model& model = *model_;
   for (int n = 0; n < model.n_bodies(); ++n) {
     Vector6<double> w = to_array(known_[n]);
@@ -148,7 +161,8 @@ void TreeSystem::recover(const SweepInput<double>& in, const std::vector<double>
       for (int i = 0; i < 6; ++i) w[i] += f[A_.offset[n] + r] * joint_[n].B[r][i];
     w_[n] = to_force(w.data());
     g_[n] = {w_[n].lin - state_[n].bias.lin, w_[n].ang - state_[n].bias.ang};
-    if (const int parent = model.topology[n].parent; parent >= 0) g_[parent] -= transpose_times(state_[n].X, w_[n]);
+    if (const int parent = model.topology[n].parent; parent >= 0)
+      g_[parent] -= transpose_times(state_[n].X, w_[n]);
   }
   const Motion<double> ground = ground_acceleration<double>(model, in.gravity_factor);
   for (int n = 0; n < model.n_bodies(); ++n) {
@@ -165,7 +179,9 @@ void TreeSystem::recover(const SweepInput<double>& in, const std::vector<double>
     }
     copy_prescribed(model, model.topology[n], in, du);
   }
-  if (loads) store_joint_loads(model, in.q, [&](int n) -> const Force<double>& { return w_[n]; }, loads);
+  if (loads)
+    store_joint_loads(
+        model, in.q, [&](int n) -> const Force<double>& { return w_[n]; }, loads);
 }
 
 }  // namespace linkwise

@@ -1,9 +1,9 @@
 #pragma once
-// Assembles A f = b of [sharf1993, eqs. (10)-(14)] for a tree, and reads motion and loads back from f.
-// With the free accelerations afree_n = M_n^-1 (g_n + known wrenches),
+// Assembles A f = b of [sharf1993, eqs. (10)-(14)] for a tree, and reads motion and loads back from
+// f. With the free accelerations afree_n = M_n^-1 (g_n + known wrenches),
 //     A_nn = B_n^T (M_n^-1 + X_n M_p^-1 X_n^T) B_n + compliance
-//     A_np = -B_n^T X_n M_p^-1 B_p,   A_ns = B_n^T X_n M_p^-1 X_s^T B_s  (siblings: a hub of the block tree)
-//     b_n  = B_n^T (X_n afree_p + c_n - afree_n) + tau / armature
+//     A_np = -B_n^T X_n M_p^-1 B_p,   A_ns = B_n^T X_n M_p^-1 X_s^T B_s  (siblings: a hub of the
+//     block tree) b_n  = B_n^T (X_n afree_p + c_n - afree_n) + tau / armature
 // Never solves. Bodies enter by their compliance alone.
 #include <vector>
 
@@ -23,7 +23,8 @@ class TreeSystem {
 
   void assemble(const SweepInput<double>& in);
   /// du [nv] from the solution f; loads [n_joints][6] or null.
-  void recover(const SweepInput<double>& in, const std::vector<double>& f, double* du, double* loads);
+  void recover(const SweepInput<double>& in, const std::vector<double>& f, double* du,
+               double* loads);
   /// Body of a node of A (they are numbered alike).
   int body_of_node(int node) const { return node; }
 

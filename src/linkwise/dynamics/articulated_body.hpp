@@ -1,5 +1,6 @@
 #pragma once
-// Articulated-body recursion [featherstone-1983, featherstone-2008 ch. 7] for trees and every joint:
+// Articulated-body recursion [featherstone-1983, featherstone-2008 ch. 7] for trees and every
+// joint:
 //     Y_n = M_n + sum X_k^T Ya_k X_k,  U = Y P,  D = P^T U + armature,  u = tau - P^T p
 //     Ya = Y - U D^-1 U^T,  pa = p + Ya c + U D^-1 u;   du = D^-1 (u - U^T (X a_p + c))
 // Ours differs in the joint frame along z, which makes U a column and D a number for one-axis
@@ -14,9 +15,14 @@ template <class S>
 class ArticulatedBody {
  public:
   explicit ArticulatedBody(const Model& model)
-      : model_(&model), state_(model.n_bodies()), body_(model.n_bodies()), general_(model.n_general), general_body_(model.n_general) {}
+      : model_(&model),
+        state_(model.n_bodies()),
+        body_(model.n_bodies()),
+        general_(model.n_general),
+        general_body_(model.n_general) {}
 
-  /// du [nv]; loads [n_joints][6] or null. Returns false when some D is not positive definite: `failed_body`.
+  /// du [nv]; loads [n_joints][6] or null. Returns false when some D is not positive definite:
+  /// `failed_body`.
   bool evaluate(const SweepInput<S>& in, S* du, S* loads) {
     calc_body_states(*model_, in, state_.data(), general_.data());
     failed_body_ = -1;
@@ -43,7 +49,8 @@ class ArticulatedBody {
     S u[6];
   };
 
-  LW_INLINE void give_to_parent(int n, const BodyTopology& body, const ArticulatedInertia<S>& Ya, const Force<S>& pa) {
+  LW_INLINE void give_to_parent(int n, const BodyTopology& body, const ArticulatedInertia<S>& Ya,
+                                const Force<S>& pa) {
     const Transform<S>& X = state_[n].X;
     BodyWork& parent = body_[body.parent];
     const ArticulatedInertia<S> Y = transform_to_parent(X, Ya);
@@ -100,7 +107,8 @@ class ArticulatedBody {
       if (__builtin_expect(!(lane(D, i) > 0), 0)) failed_body_ = n;
   }
 
-  void eliminate_general(const SweepInput<S>& in, int n, const BodyTopology& body, ArticulatedInertia<S>& Y, Force<S>& p) {
+  void eliminate_general(const SweepInput<S>& in, int n, const BodyTopology& body,
+                         ArticulatedInertia<S>& Y, Force<S>& p) {
     const GeneralState<S>& g = general_[body.general];
     GeneralWork& w = general_body_[body.general];
     const auto& armature = model_->dof_values(DofProperty::armature);
@@ -192,8 +200,10 @@ class ArticulatedBody {
       body_[n].U += state_[n].bias;
     }
     for (int n = model.n_bodies() - 1; n >= 0; --n)
-      if (const int parent = model.topology[n].parent; parent >= 0) body_[parent].U += transpose_times(state_[n].X, body_[n].U);
-    store_joint_loads(model, q, [&](int n) -> const Force<S>& { return body_[n].U; }, loads);
+      if (const int parent = model.topology[n].parent; parent >= 0)
+        body_[parent].U += transpose_times(state_[n].X, body_[n].U);
+    store_joint_loads(
+        model, q, [&](int n) -> const Force<S>& { return body_[n].U; }, loads);
   }
 
   const Model* model_;

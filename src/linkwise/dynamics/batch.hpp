@@ -33,11 +33,13 @@ class BatchEvaluator {
         count, in,
         [&](const SweepInput<double>& one, size_t i) {
           auto& kernel = made(forward_);
-          if (!kernel.evaluate(one, du + i * nv(), loads ? loads + i * n_load() : nullptr)) failed = kernel.failed_body();
+          if (!kernel.evaluate(one, du + i * nv(), loads ? loads + i * n_load() : nullptr))
+            failed = kernel.failed_body();
         },
         [&](const SweepInput<Group>& group, size_t i) {
           auto& kernel = made(forward_lanes_);
-          if (!kernel.evaluate(group, out_a(), loads ? out_b() : nullptr)) failed = kernel.failed_body();
+          if (!kernel.evaluate(group, out_a(), loads ? out_b() : nullptr))
+            failed = kernel.failed_body();
           unpack(out_a(), nv(), i, count, du);
           if (loads) unpack(out_b(), n_load(), i, count, loads);
         });
@@ -49,10 +51,13 @@ class BatchEvaluator {
     over_groups(
         count, in,
         [&](const SweepInput<double>& one, size_t i) {
-          made(inverse_).evaluate(one, one.prescribed, tau ? tau + i * nv() : nullptr, loads ? loads + i * n_load() : nullptr);
+          made(inverse_).evaluate(one, one.prescribed, tau ? tau + i * nv() : nullptr,
+                                  loads ? loads + i * n_load() : nullptr);
         },
         [&](const SweepInput<Group>& group, size_t i) {
-          made(inverse_lanes_).evaluate(group, group.prescribed, tau ? out_a() : nullptr, loads ? out_b() : nullptr);
+          made(inverse_lanes_)
+              .evaluate(group, group.prescribed, tau ? out_a() : nullptr,
+                        loads ? out_b() : nullptr);
           if (tau) unpack(out_a(), nv(), i, count, tau);
           if (loads) unpack(out_b(), n_load(), i, count, loads);
         });

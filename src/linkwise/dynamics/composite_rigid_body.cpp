@@ -9,7 +9,8 @@ namespace linkwise {
 namespace {
 
 /// Free columns of a body's motion subspace, whatever its kind.
-int body_columns(const Model& model, int n, const std::vector<GeneralState<double>>& general, Motion<double>* P, int* dof) {
+int body_columns(const Model& model, int n, const std::vector<GeneralState<double>>& general,
+                 Motion<double>* P, int* dof) {
   const BodyTopology& body = model.topology[n];
   if (body.kind == BodyKind::general) {
     const auto& g = general[body.general];
@@ -27,12 +28,18 @@ int body_columns(const Model& model, int n, const std::vector<GeneralState<doubl
 }  // namespace
 
 CompositeRigidBody::CompositeRigidBody(const Model& model)
-    : model_(&model), inverse_(model), state_(model.n_bodies()), general_(model.n_general), composite_(model.n_bodies()) {
+    : model_(&model),
+      inverse_(model),
+      state_(model.n_bodies()),
+      general_(model.n_general),
+      composite_(model.n_bodies()) {
   constexpr int limit = 20000;
   if (model.nv() > limit)
-    throw InputError("method composite_rigid_body needs a dense " + std::to_string(model.nv()) + " x " + std::to_string(model.nv()) +
-                     " matrix (" + std::to_string(static_cast<long>(8e-9 * model.nv() * model.nv())) +
-                     " GB); use articulated_body above " + std::to_string(limit) + " degrees of freedom");
+    throw InputError("method composite_rigid_body needs a dense " + std::to_string(model.nv()) +
+                     " x " + std::to_string(model.nv()) + " matrix (" +
+                     std::to_string(static_cast<long>(8e-9 * model.nv() * model.nv())) +
+                     " GB); use articulated_body above " + std::to_string(limit) +
+                     " degrees of freedom");
   std::vector<int> last(model.n_bodies(), -1);
   for (int n = 0; n < model.n_bodies(); ++n) {
     const BodyTopology& body = model.topology[n];
@@ -84,7 +91,8 @@ void CompositeRigidBody::calc_columns(const double* q) {
       const size_t row = first_[n] + k;
       for (int a = n;;) {
         const int n_a = a == n ? k + 1 : body_columns(model, a, general_, Pa, dof_a);
-        for (int i = 0; i < n_a; ++i) H_[row * n_dof + first_[a] + i] = dot(a == n ? P[i] : Pa[i], F);
+        for (int i = 0; i < n_a; ++i)
+          H_[row * n_dof + first_[a] + i] = dot(a == n ? P[i] : Pa[i], F);
         if (model.topology[a].parent < 0) break;
         F = transpose_times(state_[a].X, F);
         a = model.topology[a].parent;
@@ -100,7 +108,8 @@ void CompositeRigidBody::mass_matrix(const double* q, double* H) {
   for (size_t i = 0; i < nv * nv; ++i) H[i] = 0;
   for (size_t i = 0; i < nv; ++i) H[i * nv + i] = 1;
   for (size_t i = 0; i < n_dof; ++i)
-    for (size_t j = 0; j <= i; ++j) H[dof_[i] * nv + dof_[j]] = H[dof_[j] * nv + dof_[i]] = H_[i * n_dof + j];
+    for (size_t j = 0; j <= i; ++j)
+      H[dof_[i] * nv + dof_[j]] = H[dof_[j] * nv + dof_[i]] = H_[i * n_dof + j];
 }
 
 /// H = L^T L in place, from the tips down; returns false at a pivot that is not positive.
@@ -116,7 +125,8 @@ bool CompositeRigidBody::factor() {
     row[k] = std::sqrt(row[k]);
     for (int i = before_[k]; i >= 0; i = before_[i]) row[i] /= row[k];
     for (int i = before_[k]; i >= 0; i = before_[i])
-      for (int j = i; j >= 0; j = before_[j]) H_[static_cast<size_t>(i) * n_dof + j] -= row[i] * row[j];
+      for (int j = i; j >= 0; j = before_[j])
+        H_[static_cast<size_t>(i) * n_dof + j] -= row[i] * row[j];
   }
   return true;
 }
@@ -125,7 +135,8 @@ bool CompositeRigidBody::evaluate(const SweepInput<double>& in, double* du, doub
   failed_body_ = -1;
   const int n_dof = static_cast<int>(dof_.size());
   for (int i = 0; i < model_->nv(); ++i) du[i] = 0;
-  for (int n = 0; n < model_->n_bodies(); ++n) copy_prescribed(*model_, model_->topology[n], in, du);
+  for (int n = 0; n < model_->n_bodies(); ++n)
+    copy_prescribed(*model_, model_->topology[n], in, du);
   inverse_.evaluate(in, du, tau_.data(), nullptr);
   calc_columns(in.q);
   if (!factor()) return false;

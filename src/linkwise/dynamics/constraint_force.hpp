@@ -1,6 +1,6 @@
 #pragma once
-// Forward dynamics by the joint constraint forces: assemble A f = b, solve it by any linear solver of
-// the table, read accelerations and loads back [sharf1993].
+// Forward dynamics by the joint constraint forces: assemble A f = b, solve it by any linear solver
+// of the table, read accelerations and loads back [sharf1993].
 #include "linkwise/constraint/tree_system.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
 
@@ -9,7 +9,8 @@ namespace linkwise {
 class ConstraintForce : public DynamicsMethod {
  public:
   ConstraintForce(const Model& model, const DynamicsOptions& options);
-  DynamicsReport evaluate(double t, const SweepInput<double>& in, double* du, double* loads) override;
+  DynamicsReport evaluate(double t, const SweepInput<double>& in, double* du,
+                          double* loads) override;
   void accepted(double t) override;
   std::span<const double> constraint_force() const override { return f_; }
   const TreeSystem& system() const { return system_; }

@@ -14,7 +14,8 @@ template <class Kernel>
 class Recursion : public DynamicsMethod {
  public:
   explicit Recursion(const Model& model) : kernel_(model) {}
-  DynamicsReport evaluate(double, const SweepInput<double>& in, double* du, double* loads) override {
+  DynamicsReport evaluate(double, const SweepInput<double>& in, double* du,
+                          double* loads) override {
     DynamicsReport report;
     if (!kernel_.evaluate(in, du, loads)) {
       report.outcome = Outcome::not_positive_definite;
@@ -32,14 +33,18 @@ std::unique_ptr<DynamicsMethod> make_recursion(const Model& model, const Dynamic
   return std::make_unique<Recursion<Kernel>>(model);
 }
 
-std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model, const DynamicsOptions& options) {
+std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model,
+                                                      const DynamicsOptions& options) {
   return std::make_unique<ConstraintForce>(model, options);
 }
 
 constexpr DynamicsEntry table[] = {
-    {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false, make_recursion<ArticulatedBody<double>>},
-    {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993", true, make_constraint_force},
-    {"composite_rigid_body", "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)", "walker1982", false,
+    {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false,
+     make_recursion<ArticulatedBody<double>>},
+    {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993",
+     true, make_constraint_force},
+    {"composite_rigid_body",
+     "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)", "walker1982", false,
      make_recursion<CompositeRigidBody>},
 };
 
@@ -66,7 +71,8 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
     } else {
       choice.method = "articulated_body";
       choice.reason = model.singular_body() >= 0
-                          ? "body '" + model.body_name(model.singular_body()) + "' has a singular inertia, which only the recursion takes"
+                          ? "body '" + model.body_name(model.singular_body()) +
+                                "' has a singular inertia, which only the recursion takes"
                           : "the recursion is the fastest and the most accurate on one system";
     }
   }

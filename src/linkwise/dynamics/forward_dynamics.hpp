@@ -1,6 +1,7 @@
 #pragma once
 // The table of dynamics methods: ways from (q, v, tau) to accelerations and joint loads. A new
-// method is one file and one line; command line, Python, tests and benchmarks follow from the table.
+// method is one file and one line; command line, Python, tests and benchmarks follow from the
+// table.
 #include <memory>
 #include <span>
 #include <string>
@@ -29,7 +30,8 @@ class DynamicsMethod {
  public:
   virtual ~DynamicsMethod() = default;
   /// du [nv]; loads [n_joints][6] or null. t is only used to warm-start iterations.
-  virtual DynamicsReport evaluate(double t, const SweepInput<double>& in, double* du, double* loads) = 0;
+  virtual DynamicsReport evaluate(double t, const SweepInput<double>& in, double* du,
+                                  double* loads) = 0;
   /// The state at t was accepted by the integrator: warm starts may build on its solution.
   virtual void accepted(double /*t*/) {}
   /// Unknowns of the last evaluation; empty for methods without constraint forces.

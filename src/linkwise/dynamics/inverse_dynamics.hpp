@@ -1,5 +1,6 @@
 #pragma once
-// Newton-Euler recursion [luh1980; featherstone-2008 ch. 5]: accelerations outward, wrenches inward,
+// Newton-Euler recursion [luh1980; featherstone-2008 ch. 5]: accelerations outward, wrenches
+// inward,
 //     a_n = X_n a_p + P du + c,  w_n = M_n a_n + p_n + sum X_k^T w_k,  tau = P^T w + armature du.
 // w_n is the joint load, so this is also the witness for the loads of every other method.
 #include <vector>
@@ -12,7 +13,11 @@ template <class S>
 class InverseDynamics {
  public:
   explicit InverseDynamics(const Model& model)
-      : model_(&model), state_(model.n_bodies()), general_(model.n_general), a_(model.n_bodies()), w_(model.n_bodies()) {}
+      : model_(&model),
+        state_(model.n_bodies()),
+        general_(model.n_general),
+        a_(model.n_bodies()),
+        w_(model.n_bodies()) {}
 
   /// tau [nv] and loads [n_joints][6], either may be null. in.tau is not read; in.v null: resting.
   void evaluate(SweepInput<S> in, const S* du, S* tau, S* loads) {
@@ -21,9 +26,12 @@ class InverseDynamics {
     calc_body_states(model, in, state_.data(), general_.data());
     base_to_tip(in, du);
     for (int n = model.n_bodies() - 1; n >= 0; --n)
-      if (const int parent = model.topology[n].parent; parent >= 0) w_[parent] += transpose_times(state_[n].X, w_[n]);
+      if (const int parent = model.topology[n].parent; parent >= 0)
+        w_[parent] += transpose_times(state_[n].X, w_[n]);
     if (tau) project(in, du, tau);
-    if (loads) store_joint_loads(model, in.q, [&](int n) -> const Force<S>& { return w_[n]; }, loads);
+    if (loads)
+      store_joint_loads(
+          model, in.q, [&](int n) -> const Force<S>& { return w_[n]; }, loads);
   }
 
   const std::vector<BodyState<S>>& states() const { return state_; }

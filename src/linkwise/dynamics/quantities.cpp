@@ -32,7 +32,8 @@ void store_pose(const Transform<double>& X, double* pose) {
   pose[15] = 1;
 }
 
-Transform<double> joint_frame(const JointInfo& joint, const std::vector<Transform<double>>& frames) {
+Transform<double> joint_frame(const JointInfo& joint,
+                              const std::vector<Transform<double>>& frames) {
   const auto& X = frames[joint.first_element + joint.n_elements - 1];
   return {joint.to_user * X.R, X.r};
 }
@@ -51,14 +52,17 @@ std::vector<BodyState<double>> states_of(const Model& model, const double* q, co
 
 void body_poses(const Model& model, const double* q, double* poses) {
   const auto frames = element_frames(model, q);
-  for (int j = 0; j < model.n_joints(); ++j) store_pose(joint_frame(model.joints[j], frames), poses + 16 * j);
+  for (int j = 0; j < model.n_joints(); ++j)
+    store_pose(joint_frame(model.joints[j], frames), poses + 16 * j);
 }
 
 void link_poses(const Model& model, const double* q, double* poses) {
   const auto frames = element_frames(model, q);
   for (size_t l = 0; l < model.links.size(); ++l) {
     const LinkInfo& link = model.links[l];
-    store_pose(link.joint >= 0 ? link.placement * joint_frame(model.joints[link.joint], frames) : link.placement, poses + 16 * l);
+    store_pose(link.joint >= 0 ? link.placement * joint_frame(model.joints[link.joint], frames)
+                               : link.placement,
+               poses + 16 * l);
   }
 }
 
@@ -87,7 +91,8 @@ void body_jacobian(const Model& model, const double* q, int joint, double* J) {
 double kinetic_energy(const Model& model, const double* q, const double* v) {
   const auto states = states_of(model, q, v);
   double energy = 0;
-  for (int n = 0; n < model.n_bodies(); ++n) energy += 0.5 * dot(states[n].v, model.constants[n].inertia * states[n].v);
+  for (int n = 0; n < model.n_bodies(); ++n)
+    energy += 0.5 * dot(states[n].v, model.constants[n].inertia * states[n].v);
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int i = 0; i < model.nv(); ++i) energy += 0.5 * armature[i] * v[i] * v[i];
   return energy;
@@ -112,7 +117,8 @@ void momentum(const Model& model, const double* q, const double* v, double* h) {
     const auto& X = frames[model.topology[n].first_element + model.topology[n].n_elements - 1];
     total += transpose_times(X, model.constants[n].inertia * states[n].v);
   }
-  const double values[6] = {total.lin.x, total.lin.y, total.lin.z, total.ang.x, total.ang.y, total.ang.z};
+  const double values[6] = {total.lin.x, total.lin.y, total.lin.z,
+                            total.ang.x, total.ang.y, total.ang.z};
   for (int i = 0; i < 6; ++i) h[i] = values[i];
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-// Kinematic and energetic quantities of one state. World frame: the root link's frame at fixed base.
+// Kinematic and energetic quantities of one state. World frame: the root link's frame at fixed
+// base.
 #include "linkwise/kinematics/body_state.hpp"
 
 namespace linkwise {

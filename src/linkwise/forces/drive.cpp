@@ -2,7 +2,8 @@
 
 namespace linkwise {
 
-void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t, const double* q, const double* v, double* tau) {
+void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t,
+                       const double* q, const double* v, double* tau) {
   for (size_t j = 0; j < drives.size(); ++j) {
     const Drive& drive = drives[j];
     if (drive.kind == DriveKind::free || drive.kind == DriveKind::locked) continue;
@@ -17,12 +18,14 @@ void add_drive_torques(const Model& model, const std::vector<Drive>& drives, dou
       for (int i = 0; i < joint.nv; ++i) values[i] = drive.value[i];
     }
     for (int i = 0; i < joint.nv; ++i)
-      tau[joint.v + i] += drive.kind == DriveKind::pd ? drive.kp * (values[i] - q[joint.q + i]) + drive.kd * (rates[i] - v[joint.v + i])
+      tau[joint.v + i] += drive.kind == DriveKind::pd ? drive.kp * (values[i] - q[joint.q + i]) +
+                                                            drive.kd * (rates[i] - v[joint.v + i])
                                                       : values[i];
   }
 }
 
-void add_wrenches(const Model&, const std::vector<Wrench>& wrenches, double t, const double* poses, double* external) {
+void add_wrenches(const Model&, const std::vector<Wrench>& wrenches, double t, const double* poses,
+                  double* external) {
   for (const Wrench& wrench : wrenches) {
     double w[6];
     if (wrench.table)

@@ -28,11 +28,14 @@ struct Wrench {
   std::function<void(double, double*)> callable;
 };
 
-/// One drive a joint; adds their torques to tau [nv]. A locked joint gets none: its motion is given.
-/// pd: kp (target - q) + kd (dtarget/dt - v), for joints whose coordinates are angles and distances.
-void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t, const double* q, const double* v, double* tau);
+/// One drive a joint; adds their torques to tau [nv]. A locked joint gets none: its motion is
+/// given. pd: kp (target - q) + kd (dtarget/dt - v), for joints whose coordinates are angles and
+/// distances.
+void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t,
+                       const double* q, const double* v, double* tau);
 
 /// Adds the wrenches to external [n_joints][6], in the joints' outboard frames.
-void add_wrenches(const Model& model, const std::vector<Wrench>& wrenches, double t, const double* poses, double* external);
+void add_wrenches(const Model& model, const std::vector<Wrench>& wrenches, double t,
+                  const double* poses, double* external);
 
 }  // namespace linkwise

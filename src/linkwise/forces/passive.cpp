@@ -36,8 +36,10 @@ void add_passive_forces(const Model& model, const double* q, const double* v, do
   for_scalar_dofs(model, [&](int iq, int iv) {
     tau[iv] -= stiffness[iv] * (q[iq] - rest[iv]);
     if (!(stop[iv] > 0)) return;
-    if (q[iq] > upper[iv]) tau[iv] -= stop[iv] * (q[iq] - upper[iv]) * std::max(0.0, 1 + stop_damping[iv] * v[iv]);
-    if (q[iq] < lower[iv]) tau[iv] += stop[iv] * (lower[iv] - q[iq]) * std::max(0.0, 1 - stop_damping[iv] * v[iv]);
+    if (q[iq] > upper[iv])
+      tau[iv] -= stop[iv] * (q[iq] - upper[iv]) * std::max(0.0, 1 + stop_damping[iv] * v[iv]);
+    if (q[iq] < lower[iv])
+      tau[iv] += stop[iv] * (lower[iv] - q[iq]) * std::max(0.0, 1 - stop_damping[iv] * v[iv]);
   });
 }
 
@@ -49,7 +51,8 @@ double passive_potential(const Model& model, const double* q) {
     const double x = q[iq] - at(DofProperty::rest_position);
     energy += 0.5 * at(DofProperty::stiffness) * x * x;
     if (!(at(DofProperty::limit_stiffness) > 0)) return;
-    const double depth = std::max({0.0, q[iq] - at(DofProperty::upper), at(DofProperty::lower) - q[iq]});
+    const double depth =
+        std::max({0.0, q[iq] - at(DofProperty::upper), at(DofProperty::lower) - q[iq]});
     energy += 0.5 * at(DofProperty::limit_stiffness) * depth * depth;
   });
   return energy;

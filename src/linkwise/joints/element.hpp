@@ -1,6 +1,7 @@
 #pragma once
-// One elementary motion of any kind, for the stacks that the general sweep walks element by element:
-// its transform, its columns of the motion subspace (constant in its own frame), and dq/dt.
+// One elementary motion of any kind, for the stacks that the general sweep walks element by
+// element: its transform, its columns of the motion subspace (constant in its own frame), and
+// dq/dt.
 #include "linkwise/joints/axis_joints.hpp"
 #include "linkwise/model/model.hpp"
 
@@ -32,7 +33,9 @@ LW_INLINE Transform<S> element_pose(const Element& e, const S* q) {
     case ElementKind::planar: {
       S c, s;
       sincos(own[2], s, c);
-      return Transform<S>{{{c, s, S{}, -s, c, S{}, S{}, S{}, broadcast<S>(1)}}, {own[0], own[1], S{}}} * e.placement;
+      return Transform<S>{{{c, s, S{}, -s, c, S{}, S{}, S{}, broadcast<S>(1)}},
+                          {own[0], own[1], S{}}} *
+             e.placement;
     }
     case ElementKind::floating:
       return Transform<S>{rotation_to_child(own + 3), {own[0], own[1], own[2]}} * e.placement;
@@ -56,14 +59,16 @@ LW_INLINE Motion<S> element_column(const Element& e, int k) {
     component = 3 + k;
   else if (e.kind == ElementKind::planar && k == 2)
     component = 5;
-  S* parts[6] = {&column.lin.x, &column.lin.y, &column.lin.z, &column.ang.x, &column.ang.y, &column.ang.z};
+  S* parts[6] = {&column.lin.x, &column.lin.y, &column.lin.z,
+                 &column.ang.x, &column.ang.y, &column.ang.z};
   *parts[component] = one;
   if (e.kind == ElementKind::helical) column.lin.z = broadcast<S>(e.pitch);
   return column;
 }
 
 /// dq/dt of one element from its rates. Quaternions keep whatever length they have.
-inline void element_position_rate(const Element& e, const double* q, const double* u, double* rate) {
+inline void element_position_rate(const Element& e, const double* q, const double* u,
+                                  double* rate) {
   q += e.q;
   u += e.v;
   rate += e.q;
@@ -87,7 +92,8 @@ inline void element_position_rate(const Element& e, const double* q, const doubl
       break;
     }
     case ElementKind::floating: {
-      const Vec3<double> v = transpose_times(rotation_to_child(q + 3), Vec3<double>{u[0], u[1], u[2]});
+      const Vec3<double> v =
+          transpose_times(rotation_to_child(q + 3), Vec3<double>{u[0], u[1], u[2]});
       rate[0] = v.x;
       rate[1] = v.y;
       rate[2] = v.z;

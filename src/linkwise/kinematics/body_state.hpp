@@ -1,7 +1,8 @@
 #pragma once
 // The outward pass that every method starts with: for each body the transform from its parent,
 // velocity, velocity-dependent acceleration c and bias wrench
-//     X_n,  v_n = X_n v_p + P_n u_n,  c_n = v_n x (P_n u_n) + ...,  p_n = v_n x* (M_n v_n) - external
+//     X_n,  v_n = X_n v_p + P_n u_n,  c_n = v_n x (P_n u_n) + ...,  p_n = v_n x* (M_n v_n) -
+//     external
 // A stack of elements is walked as if its frames were massless bodies, which gives c_n and the
 // columns of P_n in the body's frame without ever forming dP/dt [featherstone-2008, ch. 4].
 #include "linkwise/joints/element.hpp"
@@ -19,8 +20,8 @@ struct BodyState {
 /// their given acceleration is part of c.
 template <class S>
 struct GeneralState {
-  int n = 0;     ///< free degrees of freedom
-  int dof[6];    ///< their indices in v
+  int n = 0;   ///< free degrees of freedom
+  int dof[6];  ///< their indices in v
   Motion<S> P[6];
 };
 
@@ -72,8 +73,8 @@ template <class J>
 inline constexpr bool is_general = std::is_same_v<J, GeneralJoint>;
 
 template <class S>
-void calc_general_state(const Model& model, const BodyTopology& body, const SweepInput<S>& in, const Motion<S>& v_parent,
-                        BodyState<S>& state, GeneralState<S>& general) {
+void calc_general_state(const Model& model, const BodyTopology& body, const SweepInput<S>& in,
+                        const Motion<S>& v_parent, BodyState<S>& state, GeneralState<S>& general) {
   Motion<S> v = v_parent, c{};
   general.n = 0;
   for (int i = 0; i < body.n_elements; ++i) {
@@ -107,12 +108,14 @@ void calc_general_state(const Model& model, const BodyTopology& body, const Swee
 template <class S>
 LW_INLINE Force<S> user_wrench(const S* external, const JointInfo& joint, int index) {
   const S* w = external + 6 * index;
-  return {transpose_times(joint.to_user, Vec3<S>{w[0], w[1], w[2]}), transpose_times(joint.to_user, Vec3<S>{w[3], w[4], w[5]})};
+  return {transpose_times(joint.to_user, Vec3<S>{w[0], w[1], w[2]}),
+          transpose_times(joint.to_user, Vec3<S>{w[3], w[4], w[5]})};
 }
 
 /// Fills states (and general for bodies of that kind). in.v may be null: resting.
 template <class S>
-void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states, GeneralState<S>* general) {
+void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states,
+                      GeneralState<S>* general) {
   for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
     using J = decltype(joint);
     for (int n = begin; n < end; ++n) {
@@ -135,18 +138,22 @@ void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>*
   });
   if (!in.external) return;
   for (int j = 0; j < model.n_joints(); ++j)
-    if (model.joints[j].last_of_body) states[model.joints[j].body].bias -= user_wrench(in.external, model.joints[j], j);
+    if (model.joints[j].last_of_body)
+      states[model.joints[j].body].bias -= user_wrench(in.external, model.joints[j], j);
 }
 
 /// Acceleration of the ground: uniform gravity as a_0 = -g.
 template <class S>
 LW_INLINE Motion<S> ground_acceleration(const Model& model, double factor) {
-  return {{broadcast<S>(-factor * model.gravity.x), broadcast<S>(-factor * model.gravity.y), broadcast<S>(-factor * model.gravity.z)}, {}};
+  return {{broadcast<S>(-factor * model.gravity.x), broadcast<S>(-factor * model.gravity.y),
+           broadcast<S>(-factor * model.gravity.z)},
+          {}};
 }
 
 /// The acceleration of prescribed degrees of freedom is what was given.
 template <class S>
-LW_INLINE void copy_prescribed(const Model& model, const BodyTopology& body, const SweepInput<S>& in, S* du) {
+LW_INLINE void copy_prescribed(const Model& model, const BodyTopology& body,
+                               const SweepInput<S>& in, S* du) {
   for (int i = 0; i < body.n_elements; ++i) {
     const Element& e = model.elements[body.first_element + i];
     if (!e.prescribed) continue;
@@ -154,8 +161,8 @@ LW_INLINE void copy_prescribed(const Model& model, const BodyTopology& body, con
   }
 }
 
-/// Joint loads in the user's joint frames, [n_joints][6], from wrench(n), body n's in its own frame.
-/// A joint inside a stack carries the same wrench as the body, moved to its own point.
+/// Joint loads in the user's joint frames, [n_joints][6], from wrench(n), body n's in its own
+/// frame. A joint inside a stack carries the same wrench as the body, moved to its own point.
 template <class S, class W>
 void store_joint_loads(const Model& model, const S* q, W&& wrench, S* loads) {
   for (int j = model.n_joints() - 1; j >= 0; --j) {
@@ -163,7 +170,8 @@ void store_joint_loads(const Model& model, const S* q, W&& wrench, S* loads) {
     Force<S> w = wrench(joint.body);
     if (!joint.last_of_body) {
       const BodyTopology& body = model.topology[joint.body];
-      for (int e = body.first_element + body.n_elements - 1; e >= joint.first_element + joint.n_elements; --e)
+      for (int e = body.first_element + body.n_elements - 1;
+           e >= joint.first_element + joint.n_elements; --e)
         w = transpose_times(element_pose(model.elements[e], q), w);
     }
     const Vec3<S> f = joint.to_user * w.lin, m = joint.to_user * w.ang;

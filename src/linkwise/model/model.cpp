@@ -12,13 +12,14 @@ namespace {
 
 using Xform = Transform<double>;
 
-/// The smallest rotation that takes z to the unit vector a, as a matrix whose columns are the turned
-/// axes; a half turn about x first when a points down, so that it never degenerates.
+/// The smallest rotation that takes z to the unit vector a, as a matrix whose columns are the
+/// turned axes; a half turn about x first when a points down, so that it never degenerates.
 Mat3<double> align_z(Vec3<double> a) {
   const bool down = a.z < 0;
   if (down) a = {a.x, -a.y, -a.z};
   const double k = 1 / (1 + a.z);
-  Mat3<double> R{{1 - a.x * a.x * k, -a.x * a.y * k, a.x, -a.x * a.y * k, 1 - a.y * a.y * k, a.y, -a.x, -a.y, a.z}};
+  Mat3<double> R{{1 - a.x * a.x * k, -a.x * a.y * k, a.x, -a.x * a.y * k, 1 - a.y * a.y * k, a.y,
+                  -a.x, -a.y, a.z}};
   if (down)
     for (int j = 3; j < 9; ++j) R.m[j] = -R.m[j];
   return R;
@@ -80,7 +81,8 @@ ElementKind element_kind(AxisKind kind) {
                                        : ElementKind::helical;
 }
 
-/// The elements of a joint, axis by axis; a revolute one for a revolute joint, two for a universal one.
+/// The elements of a joint, axis by axis; a revolute one for a revolute joint, two for a universal
+/// one.
 std::vector<AxisSpec> stack_of(const JointSpec& j) {
   std::vector<AxisSpec> axes = j.axes;
   switch (j.type) {
@@ -145,14 +147,18 @@ class ModelAssembly {
   [[noreturn]] void fail(const std::string& text) const { throw InputError(text); }
 
   void check_links() {
-    if (spec.links.empty()) fail("model '" + spec.name + "'" + where + " has no links; add at least one");
-    if (!std::isfinite(spec.gravity.x) || !std::isfinite(spec.gravity.y) || !std::isfinite(spec.gravity.z))
-      fail("model '" + spec.name + "'" + where + ": gravity is not finite; give three finite numbers in m/s2");
+    if (spec.links.empty())
+      fail("model '" + spec.name + "'" + where + " has no links; add at least one");
+    if (!std::isfinite(spec.gravity.x) || !std::isfinite(spec.gravity.y) ||
+        !std::isfinite(spec.gravity.z))
+      fail("model '" + spec.name + "'" + where +
+           ": gravity is not finite; give three finite numbers in m/s2");
     m.link_by_name_.reserve(spec.links.size());
     for (size_t i = 0; i < spec.links.size(); ++i) {
       validate_link(spec.links[i], where, m.notes);
       if (!m.link_by_name_.emplace(spec.links[i].name, static_cast<int>(i)).second)
-        fail("link '" + spec.links[i].name + "'" + where + ": the name is used twice; rename one of them");
+        fail("link '" + spec.links[i].name + "'" + where +
+             ": the name is used twice; rename one of them");
     }
   }
 
@@ -161,7 +167,8 @@ class ModelAssembly {
     if (it != m.link_by_name_.end()) return it->second;
     std::vector<std::string> known;
     for (const auto& l : spec.links) known.push_back(l.name);
-    fail("joint '" + joint.name + "'" + where + ": " + role + " link '" + name + "' does not exist" + suggest(name, known));
+    fail("joint '" + joint.name + "'" + where + ": " + role + " link '" + name +
+         "' does not exist" + suggest(name, known));
   }
 
   void check_joints() {
@@ -178,7 +185,8 @@ class ModelAssembly {
       child_link.push_back(find_link(j.child, j, "child"));
       int& in = inboard[child_link.back()];
       if (in >= 0)
-        fail("link '" + j.child + "'" + where + " is the child of two joints, '" + spec.joints[in].name + "' and '" + j.name +
+        fail("link '" + j.child + "'" + where + " is the child of two joints, '" +
+             spec.joints[in].name + "' and '" + j.name +
              "'; a tree link has one parent: remove one joint");
       in = static_cast<int>(i);
     }
@@ -190,15 +198,16 @@ class ModelAssembly {
       root = l;
     }
     if (root < 0)
-      fail("model '" + spec.name + "'" + where + ": every link has a parent, so link '" + spec.links[0].name +
-           "' is on a cycle; remove the joint that closes it");
+      fail("model '" + spec.name + "'" + where + ": every link has a parent, so link '" +
+           spec.links[0].name + "' is on a cycle; remove the joint that closes it");
   }
 
   void add_floating_base() {
     if (!spec.floating_base) return;
     for (const auto& j : spec.joints)
       if (j.name == spec.floating_joint)
-        fail("joint '" + j.name + "'" + where + ": the floating base needs this name; rename the joint");
+        fail("joint '" + j.name + "'" + where +
+             ": the floating base needs this name; rename the joint");
     JointSpec free_joint;
     free_joint.name = spec.floating_joint;
     free_joint.type = JointType::floating;
@@ -232,7 +241,8 @@ class ModelAssembly {
     for (int j = 0; j < n; ++j)
       if (!reached[j])
         fail("joint '" + spec.joints[j].name + "'" + where + ": link '" + spec.joints[j].child +
-             "' is on a cycle that the root '" + spec.links[root].name + "' does not reach; remove the joint that closes it");
+             "' is on a cycle that the root '" + spec.links[root].name +
+             "' does not reach; remove the joint that closes it");
   }
 
   void weld() {
@@ -253,8 +263,9 @@ class ModelAssembly {
       lead[c] = lead[p];
       from_lead[c] = Xform{transpose(s.rotation), s.translation} * from_lead[p];
       add(lumped[lead[c]], to_parent(from_lead[c], about_origin(spec.links[c])));
-      m.notes.push_back({NoteLevel::merge, spec.links[c].name,
-                         "welded to '" + spec.links[lead[c]].name + "' by fixed joint '" + s.name + "'"});
+      m.notes.push_back(
+          {NoteLevel::merge, spec.links[c].name,
+           "welded to '" + spec.links[lead[c]].name + "' by fixed joint '" + s.name + "'"});
     }
     moving_children.assign(n_links, 0);
     for (int j : order)
@@ -262,7 +273,8 @@ class ModelAssembly {
     if (!spec.floating_base) m.total_mass_ -= lumped[root].m;
   }
 
-  /// Massless leads: one moving child -> part of its stack; none -> error; several -> kept, recursion only.
+  /// Massless leads: one moving child -> part of its stack; none -> error; several -> kept,
+  /// recursion only.
   void stack_massless() {
     stacked.assign(spec.links.size(), 0);
     const auto consider = [&](int j) {
@@ -276,7 +288,8 @@ class ModelAssembly {
         stacked[l] = 1;
       else
         m.notes.push_back({NoteLevel::warning, spec.links[l].name,
-                           "has no mass and carries several joints; method constraint_force cannot take it, articulated_body can"});
+                           "has no mass and carries several joints; method constraint_force cannot "
+                           "take it, articulated_body can"});
     };
     if (spec.floating_base) consider(-1);
     for (int j : order)
@@ -312,7 +325,8 @@ class ModelAssembly {
     m.joints.push_back(std::move(info));
   }
 
-  /// Bodies in the order of the joints that carry mass; each takes the stack of joints inboard of it.
+  /// Bodies in the order of the joints that carry mass; each takes the stack of joints inboard of
+  /// it.
   void make_bodies() {
     std::vector<int> body_of_link(spec.links.size(), -1);
     for (int jm = 0; jm < m.n_joints(); ++jm) {
@@ -349,13 +363,16 @@ class ModelAssembly {
     }
     if (body.nv > 6) {
       std::string names;
-      for (size_t i = 0; i + 1 < chain.size(); ++i) names += (i ? "', '" : "'") + spec.links[m.joints[chain[i]].link].name;
-      fail("links " + names + "'" + where + " have no mass and leave " + std::to_string(body.nv) + " degrees of freedom between '" +
-           spec.links[link].name + "' and the next inboard mass (6 at most); give one of them a mass and an inertia");
+      for (size_t i = 0; i + 1 < chain.size(); ++i)
+        names += (i ? "', '" : "'") + spec.links[m.joints[chain[i]].link].name;
+      fail("links " + names + "'" + where + " have no mass and leave " + std::to_string(body.nv) +
+           " degrees of freedom between '" + spec.links[link].name +
+           "' and the next inboard mass (6 at most); give one of them a mass and an inertia");
     }
     for (size_t i = 0; i + 1 < chain.size(); ++i)
       m.notes.push_back({NoteLevel::merge, spec.links[m.joints[chain[i]].link].name,
-                         "has no mass: joint '" + m.joints[chain[i]].name + "' is stacked with '" + m.joints[chain[i + 1]].name + "'"});
+                         "has no mass: joint '" + m.joints[chain[i]].name + "' is stacked with '" +
+                             m.joints[chain[i + 1]].name + "'"});
     const JointInfo& last = m.joints[chain.back()];
     body.n_elements = static_cast<int>(m.elements.size()) - body.first_element;
     // From the link's axes to the body frame's.
@@ -386,10 +403,12 @@ class ModelAssembly {
     if (body.kind == BodyKind::general) body.general = m.n_general++;
   }
 
-  /// The joint's elements, placed after the frame of the previous one (or of the parent link's joint).
+  /// The joint's elements, placed after the frame of the previous one (or of the parent link's
+  /// joint).
   void add_elements(JointInfo& info, Xform& tree) {
     const int sj = inboard[info.link];
-    Xform to_joint{Mat3<double>::identity(), {}};  // previous internal frame -> user joint frame at zero
+    Xform to_joint{Mat3<double>::identity(),
+                   {}};  // previous internal frame -> user joint frame at zero
     const JointSpec& s = joint_spec(sj);
     if (sj >= 0) {
       const int pl = parent_link[sj], pj = joint_of[lead[pl]];
@@ -402,7 +421,8 @@ class ModelAssembly {
     e.q = info.q;
     e.v = info.v;
     e.joint = static_cast<int>(&info - m.joints.data());
-    e.prescribed = std::find(spec.prescribed.begin(), spec.prescribed.end(), s.name) != spec.prescribed.end();
+    e.prescribed =
+        std::find(spec.prescribed.begin(), spec.prescribed.end(), s.name) != spec.prescribed.end();
     const auto push = [&](ElementKind kind, int nq, int nv, const Mat3<double>& A, double pitch) {
       e.kind = kind;
       e.nq = nq;
@@ -412,7 +432,8 @@ class ModelAssembly {
       m.elements.push_back(e);
       e.q += nq;
       e.v += nv;
-      to_joint = Xform{A, {}};  // the next element starts from this frame, turned back to the user's axes
+      to_joint =
+          Xform{A, {}};  // the next element starts from this frame, turned back to the user's axes
       info.to_user = A;
       tree = e.placement;
     };
@@ -425,13 +446,15 @@ class ModelAssembly {
     else if (s.type == JointType::planar)
       push(ElementKind::planar, 3, 3, align_z(s.axes[0].axis), 0);
     else
-      for (const AxisSpec& a : stack_of(s)) push(element_kind(a.kind), 1, 1, align_z(a.axis), a.pitch);
+      for (const AxisSpec& a : stack_of(s))
+        push(element_kind(a.kind), 1, 1, align_z(a.axis), a.pitch);
     info.n_elements = static_cast<int>(m.elements.size()) - info.first_element;
   }
 
   void make_runs() {
     for (int b = 0; b < m.n_bodies(); ++b) {
-      if (m.runs.empty() || m.runs.back().kind != m.topology[b].kind) m.runs.push_back({m.topology[b].kind, b, b});
+      if (m.runs.empty() || m.runs.back().kind != m.topology[b].kind)
+        m.runs.push_back({m.topology[b].kind, b, b});
       m.runs.back().end = b + 1;
     }
     std::vector<char> met(m.n_bodies(), 0);
@@ -444,8 +467,8 @@ class ModelAssembly {
       const auto& values = m.dof_values(p);
       return std::any_of(values.begin(), values.end(), [](double x) { return x > 0; });
     };
-    m.has_passive_ = any(DofProperty::damping) || any(DofProperty::friction) || any(DofProperty::stiffness) ||
-                     any(DofProperty::limit_stiffness);
+    m.has_passive_ = any(DofProperty::damping) || any(DofProperty::friction) ||
+                     any(DofProperty::stiffness) || any(DofProperty::limit_stiffness);
     m.gravity = spec.gravity;
     for (const std::string& name : spec.prescribed) m.joint_index(name);
   }
@@ -458,7 +481,8 @@ int Model::joint_index(const std::string& name) const {
   if (it != joint_by_name_.end()) return it->second;
   std::vector<std::string> known;
   for (const auto& j : joints) known.push_back(j.name);
-  throw InputError("joint '" + name + "' does not exist in model '" + spec_.name + "'" + where() + suggest(name, known));
+  throw InputError("joint '" + name + "' does not exist in model '" + spec_.name + "'" + where() +
+                   suggest(name, known));
 }
 
 int Model::link_index(const std::string& name) const {
@@ -466,7 +490,8 @@ int Model::link_index(const std::string& name) const {
   if (it != link_by_name_.end()) return it->second;
   std::vector<std::string> known;
   for (const auto& l : links) known.push_back(l.name);
-  throw InputError("link '" + name + "' does not exist in model '" + spec_.name + "'" + where() + suggest(name, known));
+  throw InputError("link '" + name + "' does not exist in model '" + spec_.name + "'" + where() +
+                   suggest(name, known));
 }
 
 std::vector<double> Model::neutral_configuration() const {

@@ -1,6 +1,7 @@
 #pragma once
 // The immutable description that every sweep reads: arrays over bodies (parents first), over the
-// elementary motions of their joints, and the names. Built once from a ModelSpec, O(N), no recursion.
+// elementary motions of their joints, and the names. Built once from a ModelSpec, O(N), no
+// recursion.
 //
 // Two levels of "joint": a user's joint (revolute ... composite) is a stack of elements; a body's
 // inboard connection is the stack of all the joints between it and the nearest inboard body with
@@ -16,7 +17,15 @@
 
 namespace linkwise {
 
-enum class ElementKind : std::uint8_t { fixed, revolute, prismatic, helical, spherical, planar, floating };
+enum class ElementKind : std::uint8_t {
+  fixed,
+  revolute,
+  prismatic,
+  helical,
+  spherical,
+  planar,
+  floating
+};
 
 /// One motion of a joint: a fixed placement after the previous frame, then the motion. Frames are
 /// turned so that the axis of the first three kinds, and the normal of planar, is z.
@@ -40,7 +49,7 @@ struct BodyTopology {
   int q = 0, nq = 0, v = 0, nv = 0;
   int n_children = 0;
   bool first_to_give = false;  ///< the first of its siblings that a tip-to-base sweep meets
-  int general = -1;  ///< index among bodies of kind general
+  int general = -1;            ///< index among bodies of kind general
 };
 
 template <class C>
@@ -59,12 +68,13 @@ struct Run {
 struct JointInfo {
   std::string name;
   JointType type;
-  int body;                           ///< the body that its stack belongs to
+  int body;  ///< the body that its stack belongs to
   int first_element = 0, n_elements = 0;
   int q = 0, nq = 0, v = 0, nv = 0;
-  int link;                           ///< child link (index into links)
-  Mat3<double> to_user;               ///< turns components of the last element's frame into the user's joint frame
-  bool last_of_body = true;           ///< its frame is the body's frame
+  int link;  ///< child link (index into links)
+  Mat3<double>
+      to_user;  ///< turns components of the last element's frame into the user's joint frame
+  bool last_of_body = true;  ///< its frame is the body's frame
 };
 
 /// Where a link of the file is: on which joint's frame (-1: ground), and how it is placed there.
@@ -112,7 +122,9 @@ class Model {
   std::vector<Note> notes;
   /// One array of length nv for each property of dof_property_table.
   std::array<std::vector<double>, n_dof_properties> dof;
-  const std::vector<double>& dof_values(DofProperty property) const { return dof[static_cast<int>(property)]; }
+  const std::vector<double>& dof_values(DofProperty property) const {
+    return dof[static_cast<int>(property)];
+  }
   Vec3<double> gravity;
   int n_general = 0;
 

@@ -15,10 +15,12 @@ struct JointTypeEntry {
   int dof;  ///< -1: one per axis
 };
 constexpr JointTypeEntry joint_type_table[] = {
-    {JointType::fixed, "fixed", 0},           {JointType::revolute, "revolute", 1}, {JointType::continuous, "continuous", 1},
-    {JointType::prismatic, "prismatic", 1},   {JointType::helical, "helical", 1},   {JointType::cylindrical, "cylindrical", 2},
-    {JointType::universal, "universal", 2},   {JointType::spherical, "spherical", 3}, {JointType::planar, "planar", 3},
-    {JointType::floating, "floating", 6},     {JointType::composite, "composite", -1},
+    {JointType::fixed, "fixed", 0},           {JointType::revolute, "revolute", 1},
+    {JointType::continuous, "continuous", 1}, {JointType::prismatic, "prismatic", 1},
+    {JointType::helical, "helical", 1},       {JointType::cylindrical, "cylindrical", 2},
+    {JointType::universal, "universal", 2},   {JointType::spherical, "spherical", 3},
+    {JointType::planar, "planar", 3},         {JointType::floating, "floating", 6},
+    {JointType::composite, "composite", -1},
 };
 
 // A flat byte string: plain numbers in the machine's order, counts as 64-bit integers.
@@ -34,14 +36,17 @@ struct Writer {
     number<std::uint64_t>(s.size());
     bytes += s;
   }
-  void reals(const double* x, size_t n) { bytes.append(reinterpret_cast<const char*>(x), n * sizeof(double)); }
+  void reals(const double* x, size_t n) {
+    bytes.append(reinterpret_cast<const char*>(x), n * sizeof(double));
+  }
 };
 
 struct Reader {
   const std::string& bytes;
   size_t at = 0;
   void take(void* out, size_t n) {
-    if (n > bytes.size() - at) throw InputError("model data is cut short; it was not written by this version of linkwise");
+    if (n > bytes.size() - at)
+      throw InputError("model data is cut short; it was not written by this version of linkwise");
     std::memcpy(out, bytes.data() + at, n);
     at += n;
   }
@@ -53,7 +58,8 @@ struct Reader {
   }
   size_t count() {
     const auto n = number<std::uint64_t>();
-    if (n > bytes.size() - at) throw InputError("model data is cut short; it was not written by this version of linkwise");
+    if (n > bytes.size() - at)
+      throw InputError("model data is cut short; it was not written by this version of linkwise");
     return n;
   }
   std::string text() {
@@ -67,7 +73,8 @@ struct Reader {
 
 int joint_dof(const JointSpec& joint) {
   for (const auto& entry : joint_type_table)
-    if (entry.type == joint.type) return entry.dof >= 0 ? entry.dof : static_cast<int>(joint.axes.size());
+    if (entry.type == joint.type)
+      return entry.dof >= 0 ? entry.dof : static_cast<int>(joint.axes.size());
   return 0;
 }
 
@@ -133,7 +140,9 @@ ModelSpec deserialize(const std::string& bytes) {
   char head[sizeof(magic) - 1];
   r.take(head, sizeof(head));
   if (std::memcmp(head, magic, sizeof(head)) != 0)
-    throw InputError("model data was not written by this version of linkwise; build the model again from its source");
+    throw InputError(
+        "model data was not written by this version of linkwise; build the model again from its "
+        "source");
   ModelSpec spec;
   spec.name = r.text();
   spec.source = r.text();

@@ -34,9 +34,9 @@ struct AxisSpec {
 
 struct LinkSpec {
   std::string name;
-  double mass = 0;              ///< kg
-  Vec3<double> com;             ///< centre of mass in the link frame, m
-  Sym3<double> inertia;         ///< about the centre of mass, link axes, kg m^2
+  double mass = 0;       ///< kg
+  Vec3<double> com;      ///< centre of mass in the link frame, m
+  Sym3<double> inertia;  ///< about the centre of mass, link axes, kg m^2
 };
 
 /// Properties that a joint has once per degree of freedom; one value stands for all of them.
@@ -46,13 +46,14 @@ enum class DofProperty {
   friction_velocity,  ///< speed below which Coulomb friction is smoothed: level * tanh(u / speed)
   stiffness,          ///< spring to rest_position, N m/rad or N/m
   rest_position,
-  armature,           ///< rotor inertia seen at the joint, kg m2 or kg
+  armature,  ///< rotor inertia seen at the joint, kg m2 or kg
   lower,
   upper,
   effort,
   velocity,
   limit_stiffness,  ///< of the compliant stops at lower and upper; 0: limits exert no force
-  limit_damping,    ///< s/rad or s/m: stop force = limit_stiffness * depth * (1 + limit_damping * speed)
+  limit_damping,    ///< s/rad or s/m: stop force = limit_stiffness * depth * (1 + limit_damping *
+                    ///< speed)
 };
 inline constexpr int n_dof_properties = 12;
 
@@ -63,10 +64,18 @@ struct DofPropertyEntry {
 };
 inline constexpr double infinity = std::numeric_limits<double>::infinity();
 inline constexpr DofPropertyEntry dof_property_table[n_dof_properties] = {
-    {"damping", 0, false, false},       {"friction", 0, false, false},        {"friction_velocity", 0.01, false, false},
-    {"stiffness", 0, false, false},     {"rest_position", 0, false, true},    {"armature", 0, false, false},
-    {"lower", -infinity, true, true},   {"upper", infinity, true, true},      {"effort", infinity, true, false},
-    {"velocity", infinity, true, false}, {"limit_stiffness", 0, false, false}, {"limit_damping", 0, false, false},
+    {"damping", 0, false, false},
+    {"friction", 0, false, false},
+    {"friction_velocity", 0.01, false, false},
+    {"stiffness", 0, false, false},
+    {"rest_position", 0, false, true},
+    {"armature", 0, false, false},
+    {"lower", -infinity, true, true},
+    {"upper", infinity, true, true},
+    {"effort", infinity, true, false},
+    {"velocity", infinity, true, false},
+    {"limit_stiffness", 0, false, false},
+    {"limit_damping", 0, false, false},
 };
 
 /// Only what differs from the table's fallbacks, so that a million plain joints stay small.
@@ -79,9 +88,10 @@ struct JointSpec {
   std::string name;
   JointType type = JointType::revolute;
   std::string parent, child;
-  Mat3<double> rotation = Mat3<double>::identity();  ///< joint axes in the parent link frame (columns)
-  Vec3<double> translation;                          ///< joint point in the parent link frame, m
-  std::vector<AxisSpec> axes;                        ///< one for the 1-DOF types and planar (its normal)
+  Mat3<double> rotation =
+      Mat3<double>::identity();  ///< joint axes in the parent link frame (columns)
+  Vec3<double> translation;      ///< joint point in the parent link frame, m
+  std::vector<AxisSpec> axes;    ///< one for the 1-DOF types and planar (its normal)
   std::vector<DofValue> dof;
 };
 

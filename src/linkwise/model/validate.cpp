@@ -9,7 +9,9 @@
 namespace linkwise {
 namespace {
 
-bool finite(const Vec3<double>& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(const Vec3<double>& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 int edit_distance(const std::string& a, const std::string& b) {
   std::vector<int> row(b.size() + 1);
@@ -30,21 +32,23 @@ int edit_distance(const std::string& a, const std::string& b) {
 
 void principal_moments(const Sym3<double>& I, double out[3]) {
   // Trigonometric solution of the characteristic cubic on the scaled matrix.
-  const double scale = std::max({std::abs(I.m[0]), std::abs(I.m[1]), std::abs(I.m[2]), std::abs(I.m[3]),
-                                 std::abs(I.m[4]), std::abs(I.m[5])});
+  const double scale = std::max({std::abs(I.m[0]), std::abs(I.m[1]), std::abs(I.m[2]),
+                                 std::abs(I.m[3]), std::abs(I.m[4]), std::abs(I.m[5])});
   if (scale == 0) {
     out[0] = out[1] = out[2] = 0;
     return;
   }
-  const double a = I.m[0] / scale, b = I.m[1] / scale, c = I.m[2] / scale, d = I.m[3] / scale, e = I.m[4] / scale,
-               f = I.m[5] / scale;
+  const double a = I.m[0] / scale, b = I.m[1] / scale, c = I.m[2] / scale, d = I.m[3] / scale,
+               e = I.m[4] / scale, f = I.m[5] / scale;
   const double mean = (a + c + f) / 3, off = b * b + d * d + e * e;
-  const double p = std::sqrt(((a - mean) * (a - mean) + (c - mean) * (c - mean) + (f - mean) * (f - mean) + 2 * off) / 6);
+  const double p = std::sqrt(
+      ((a - mean) * (a - mean) + (c - mean) * (c - mean) + (f - mean) * (f - mean) + 2 * off) / 6);
   if (p < 1e-300) {
     out[0] = out[1] = out[2] = mean * scale;
     return;
   }
-  const double aa = (a - mean) / p, cc = (c - mean) / p, ff = (f - mean) / p, bb = b / p, dd = d / p, ee = e / p;
+  const double aa = (a - mean) / p, cc = (c - mean) / p, ff = (f - mean) / p, bb = b / p,
+               dd = d / p, ee = e / p;
   const double det = aa * (cc * ff - ee * ee) - bb * (bb * ff - ee * dd) + dd * (bb * ee - cc * dd);
   const double angle = std::acos(std::clamp(det / 2, -1.0, 1.0)) / 3;
   const double largest = mean + 2 * p * std::cos(angle);
@@ -56,59 +60,77 @@ void principal_moments(const Sym3<double>& I, double out[3]) {
 
 void validate_link(const LinkSpec& link, const std::string& where, std::vector<Note>& notes) {
   const std::string head = "link '" + link.name + "'" + where + ": ";
-  if (link.name.empty()) throw InputError("a link" + where + " has an empty name; give every link a name");
-  if (!std::isfinite(link.mass)) throw InputError(head + "mass is not a finite number; give a mass in kg");
+  if (link.name.empty())
+    throw InputError("a link" + where + " has an empty name; give every link a name");
+  if (!std::isfinite(link.mass))
+    throw InputError(head + "mass is not a finite number; give a mass in kg");
   if (link.mass < 0) throw InputError(head + "mass is negative; give a mass >= 0 in kg");
-  if (!finite(link.com)) throw InputError(head + "centre of mass is not finite; give three finite numbers in m");
+  if (!finite(link.com))
+    throw InputError(head + "centre of mass is not finite; give three finite numbers in m");
   for (double x : link.inertia.m)
-    if (!std::isfinite(x)) throw InputError(head + "inertia is not finite; give finite numbers in kg m2");
+    if (!std::isfinite(x))
+      throw InputError(head + "inertia is not finite; give finite numbers in kg m2");
   double principal[3];
   principal_moments(link.inertia, principal);
   const double scale = std::max(std::abs(principal[0]), std::abs(principal[2]));
   if (principal[0] < -1e-6 * scale)
-    throw InputError(head + "inertia has a negative principal moment (" + std::to_string(principal[0]) +
+    throw InputError(head + "inertia has a negative principal moment (" +
+                     std::to_string(principal[0]) +
                      " kg m2); give a positive semidefinite inertia about the centre of mass");
   if (link.mass == 0 && scale > 0)
     notes.push_back({NoteLevel::warning, link.name, "has rotational inertia but no mass"});
   if (link.mass > 0 && principal[0] <= 1e-12 * scale)
     notes.push_back({NoteLevel::warning, link.name, "a principal moment of inertia is zero"});
   else if (scale > 0 && principal[0] + principal[1] < principal[2] * (1 - 1e-9))
-    notes.push_back({NoteLevel::warning, link.name,
-                     "principal moments of inertia break the triangle inequality: no real body has them"});
+    notes.push_back(
+        {NoteLevel::warning, link.name,
+         "principal moments of inertia break the triangle inequality: no real body has them"});
 }
 
 void validate_joint(JointSpec& joint, const std::string& where) {
   const std::string head = "joint '" + joint.name + "'" + where + ": ";
-  if (joint.name.empty()) throw InputError("a joint" + where + " has an empty name; give every joint a name");
-  if (!finite(joint.translation)) throw InputError(head + "translation is not finite; give three finite numbers in m");
+  if (joint.name.empty())
+    throw InputError("a joint" + where + " has an empty name; give every joint a name");
+  if (!finite(joint.translation))
+    throw InputError(head + "translation is not finite; give three finite numbers in m");
   double worst = 0;
   const Mat3<double> product = transpose(joint.rotation) * joint.rotation;
   for (int i = 0; i < 9; ++i) {
-    if (!std::isfinite(joint.rotation.m[i])) throw InputError(head + "rotation is not finite; give a 3x3 rotation matrix");
+    if (!std::isfinite(joint.rotation.m[i]))
+      throw InputError(head + "rotation is not finite; give a 3x3 rotation matrix");
     worst = std::max(worst, std::abs(product.m[i] - (i % 4 == 0)));
   }
   const auto& R = joint.rotation.m;
-  const double det = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6]) + R[2] * (R[3] * R[7] - R[4] * R[6]);
-  if (worst > 1e-6 || det < 0) throw InputError(head + "rotation is not a rotation matrix; give an orthonormal right-handed 3x3 matrix");
+  const double det = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6]) +
+                     R[2] * (R[3] * R[7] - R[4] * R[6]);
+  if (worst > 1e-6 || det < 0)
+    throw InputError(
+        head + "rotation is not a rotation matrix; give an orthonormal right-handed 3x3 matrix");
   const size_t expected = joint.type == JointType::universal ? 2
-                          : joint.type == JointType::fixed || joint.type == JointType::spherical || joint.type == JointType::floating
+                          : joint.type == JointType::fixed || joint.type == JointType::spherical ||
+                                  joint.type == JointType::floating
                               ? 0
                               : 1;
   if (joint.type == JointType::composite ? joint.axes.empty() : joint.axes.size() < expected)
-    throw InputError(head + "has " + std::to_string(joint.axes.size()) + " axes; a " + joint_type_name(joint.type) +
-                     " joint needs " + (joint.type == JointType::composite ? "at least one" : std::to_string(expected)));
+    throw InputError(
+        head + "has " + std::to_string(joint.axes.size()) + " axes; a " +
+        joint_type_name(joint.type) + " joint needs " +
+        (joint.type == JointType::composite ? "at least one" : std::to_string(expected)));
   if (joint.type != JointType::composite) joint.axes.resize(expected);
   for (AxisSpec& a : joint.axes) {
     if (!finite(a.axis)) throw InputError(head + "axis is not finite; give three finite numbers");
     const double largest = std::max({std::abs(a.axis.x), std::abs(a.axis.y), std::abs(a.axis.z)});
     if (largest == 0) throw InputError(head + "axis has zero length; give a nonzero axis");
-    a.axis = (1 / largest) * a.axis;  // first, so that 1e200 and 1e-200 do not overflow or vanish when squared
+    a.axis = (1 / largest) *
+             a.axis;  // first, so that 1e200 and 1e-200 do not overflow or vanish when squared
     a.axis = (1 / std::sqrt(dot(a.axis, a.axis))) * a.axis;
-    if (!std::isfinite(a.pitch)) throw InputError(head + "pitch is not finite; give the advance in m per rad");
+    if (!std::isfinite(a.pitch))
+      throw InputError(head + "pitch is not finite; give the advance in m per rad");
   }
   const int nv = joint_dof(joint);
   if (nv > 6)
-    throw InputError(head + "has " + std::to_string(nv) + " degrees of freedom; a joint can have 6 at most");
+    throw InputError(head + "has " + std::to_string(nv) +
+                     " degrees of freedom; a joint can have 6 at most");
 }
 
 void append_dof_properties(const JointSpec& joint, const std::string& where,
@@ -116,19 +138,22 @@ void append_dof_properties(const JointSpec& joint, const std::string& where,
   const std::string head = "joint '" + joint.name + "'" + where + ": ";
   const int nv = joint_dof(joint);
   const size_t start = dof[0].size();
-  for (int p = 0; p < n_dof_properties; ++p) dof[p].insert(dof[p].end(), nv, dof_property_table[p].fallback);
+  for (int p = 0; p < n_dof_properties; ++p)
+    dof[p].insert(dof[p].end(), nv, dof_property_table[p].fallback);
   for (const DofValue& given : joint.dof) {
     const int p = static_cast<int>(given.property);
     const DofPropertyEntry& entry = dof_property_table[p];
     const size_t count = given.values.size();
     if (count != 1 && count != static_cast<size_t>(nv))
-      throw InputError(head + entry.name + " has " + std::to_string(count) + " values but the joint has " +
-                       std::to_string(nv) + " degrees of freedom; give one value or " + std::to_string(nv));
+      throw InputError(head + entry.name + " has " + std::to_string(count) +
+                       " values but the joint has " + std::to_string(nv) +
+                       " degrees of freedom; give one value or " + std::to_string(nv));
     for (int i = 0; i < nv; ++i) {
       const double x = given.values[count == 1 ? 0 : i];
       if (std::isnan(x) || (!entry.infinite_ok && std::isinf(x)))
         throw InputError(head + entry.name + " is not a finite number; give a finite value");
-      if (!entry.negative_ok && x < 0) throw InputError(head + entry.name + " is negative; give a value >= 0");
+      if (!entry.negative_ok && x < 0)
+        throw InputError(head + entry.name + " is negative; give a value >= 0");
       dof[p][start + i] = x;
     }
   }
@@ -138,9 +163,13 @@ void append_dof_properties(const JointSpec& joint, const std::string& where,
     if (at(DofProperty::lower, i) > at(DofProperty::upper, i))
       throw InputError(head + "lower limit is above the upper limit; swap them");
     if (at(DofProperty::friction, i) > 0 && at(DofProperty::friction_velocity, i) == 0)
-      throw InputError(head + "friction_velocity is zero; give the speed below which friction is smoothed");
-    if (quaternion && (at(DofProperty::stiffness, i) > 0 || at(DofProperty::limit_stiffness, i) > 0))
-      throw InputError(head + "springs and limits need an angle or a distance; use a composite joint of axes instead of " +
+      throw InputError(
+          head + "friction_velocity is zero; give the speed below which friction is smoothed");
+    if (quaternion &&
+        (at(DofProperty::stiffness, i) > 0 || at(DofProperty::limit_stiffness, i) > 0))
+      throw InputError(head +
+                       "springs and limits need an angle or a distance; use a composite joint of "
+                       "axes instead of " +
                        joint_type_name(joint.type));
   }
 }
@@ -157,7 +186,8 @@ std::string suggest(const std::string& name, const std::vector<std::string>& kno
       best = &known[i];
     }
   }
-  if (best_distance <= std::max<int>(2, static_cast<int>(name.size()) / 3)) return "; did you mean '" + *best + "'?";
+  if (best_distance <= std::max<int>(2, static_cast<int>(name.size()) / 3))
+    return "; did you mean '" + *best + "'?";
   std::string list = "; known: ";
   for (size_t i = 0; i < std::min<size_t>(known.size(), 8); ++i) list += (i ? ", " : "") + known[i];
   return known.size() > 8 ? list + ", ..." : list;

@@ -1,5 +1,6 @@
 #pragma once
-// Checks of single elements, before anything is built. Every message is one line: element, file, remedy.
+// Checks of single elements, before anything is built. Every message is one line: element, file,
+// remedy.
 #include <string>
 #include <vector>
 
@@ -7,12 +8,12 @@
 
 namespace linkwise {
 
-/// Throws InputError on non-finite numbers, a negative mass or a clearly negative principal inertia;
-/// adds a warning note on a broken triangle inequality or a vanishing principal inertia.
+/// Throws InputError on non-finite numbers, a negative mass or a clearly negative principal
+/// inertia; adds a warning note on a broken triangle inequality or a vanishing principal inertia.
 void validate_link(const LinkSpec& link, const std::string& where, std::vector<Note>& notes);
 
-/// Throws InputError on non-finite numbers, a placement that is no rotation, or a zero or missing axis;
-/// normalises the axes.
+/// Throws InputError on non-finite numbers, a placement that is no rotation, or a zero or missing
+/// axis; normalises the axes.
 void validate_joint(JointSpec& joint, const std::string& where);
 
 /// Appends the joint's properties, one value per degree of freedom, to the model's arrays. Throws

@@ -9,7 +9,9 @@
 namespace linkwise {
 
 Simulation::Simulation(std::shared_ptr<const Model> model, SimulationOptions options)
-    : model_(std::move(model)), options_(std::move(options)), choice_(choose_dynamics(*model_, options_.dynamics)),
+    : model_(std::move(model)),
+      options_(std::move(options)),
+      choice_(choose_dynamics(*model_, options_.dynamics)),
       drives_(model_->n_joints()) {
   // Made once here so that bad options are refused before anything is written.
   make_dynamics(*model_, options_.dynamics);
@@ -19,15 +21,18 @@ Simulation::Simulation(std::shared_ptr<const Model> model, SimulationOptions opt
 void Simulation::set_drive(int joint, Drive drive) {
   const JointInfo& info = model_->joints[joint];
   if (drive.kind == DriveKind::pd && info.nq != info.nv)
-    throw InputError("joint '" + info.name + "'" + model_->where() + ": a pd drive needs angles or distances, not a quaternion; drive it by torque");
+    throw InputError(
+        "joint '" + info.name + "'" + model_->where() +
+        ": a pd drive needs angles or distances, not a quaternion; drive it by torque");
   drives_[joint] = std::move(drive);
 }
 
 void Simulation::add_wrench(Wrench wrench) {
   const JointInfo& info = model_->joints[wrench.joint];
   if (!info.last_of_body)
-    throw InputError("body '" + model_->links[info.link].name + "'" + model_->where() +
-                     " has no mass, so no wrench can act on it; apply it to the next body outboard");
+    throw InputError(
+        "body '" + model_->links[info.link].name + "'" + model_->where() +
+        " has no mass, so no wrench can act on it; apply it to the next body outboard");
   wrenches_.push_back(std::move(wrench));
 }
 
@@ -38,7 +43,9 @@ void Simulation::start(double t0, const double* q0, const double* v0) {
     if (drives_[j].kind != DriveKind::locked) continue;
     const JointInfo& info = m.joints[j];
     for (int i = 0; i < info.nv; ++i)
-      if (v0[info.v + i] != 0) throw InputError("joint '" + info.name + "'" + m.where() + " is locked but starts with a rate; start it at rest");
+      if (v0[info.v + i] != 0)
+        throw InputError("joint '" + info.name + "'" + m.where() +
+                         " is locked but starts with a rate; start it at rest");
     if (spec.prescribed.empty()) spec = m.spec();
     spec.prescribed.push_back(info.name);
   }
@@ -62,7 +69,8 @@ void Simulation::start(double t0, const double* q0, const double* v0) {
     const double* p = &y_[e.q + e.nq - 4];
     const double norm = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
     if (!(norm > 1e-6))
-      throw InputError("joint '" + m.joints[e.joint].name + "'" + m.where() + ": its quaternion has zero length; give x, y, z, w of length 1");
+      throw InputError("joint '" + m.joints[e.joint].name + "'" + m.where() +
+                       ": its quaternion has zero length; give x, y, z, w of length 1");
   }
   normalise(y_.data());
   iterations_ = 0;
@@ -71,7 +79,8 @@ void Simulation::start(double t0, const double* q0, const double* v0) {
   integrator_->start(t0, y_);
 }
 
-bool Simulation::accelerations(DynamicsMethod& method, double t, const double* q, const double* v, double* du, double* loads) {
+bool Simulation::accelerations(DynamicsMethod& method, double t, const double* q, const double* v,
+                               double* du, double* loads) {
   const Model& m = *model_;
   std::fill(tau_.begin(), tau_.end(), 0.0);
   add_drive_torques(m, drives_, t, q, v, tau_.data());
@@ -140,10 +149,11 @@ bool Simulation::advance(double t, const Sample& sample) {
     const StepStatus status = integrator_->step(t);
     if (status == StepStatus::ok) continue;
     stop_.time = integrator_->time();
-    if ((status == StepStatus::evaluation_failed || status == StepStatus::not_finite) && !pending_.ok()) {
+    if ((status == StepStatus::evaluation_failed || status == StepStatus::not_finite) &&
+        !pending_.ok()) {
       stop_ = pending_;
     } else {
-      stop_.outcome = status == StepStatus::not_finite        ? "not_finite"
+      stop_.outcome = status == StepStatus::not_finite       ? "not_finite"
                       : status == StepStatus::step_too_small ? "step_too_small"
                       : status == StepStatus::too_many_steps ? "too_many_steps"
                                                              : "evaluation_failed";
@@ -184,7 +194,8 @@ bool Simulation::write_sample(double t, const Sample& s) {
         for (int j = 0; j < m.n_joints(); ++j) {
           if (drives_[j].kind != DriveKind::locked) continue;
           const JointInfo& info = m.joints[j];
-          for (int i = info.v; i < info.v + info.nv; ++i) s.drive_torque[i] = total[i] - (tau_[i] - holding_[i]);
+          for (int i = info.v; i < info.v + info.nv; ++i)
+            s.drive_torque[i] = total[i] - (tau_[i] - holding_[i]);
         }
       }
     }

@@ -19,7 +19,8 @@ struct SimulationOptions {
 
 /// Where one sample goes; null pointers are not computed.
 struct Sample {
-  double *position = nullptr, *velocity = nullptr, *acceleration = nullptr, *joint_load = nullptr, *drive_torque = nullptr;
+  double *position = nullptr, *velocity = nullptr, *acceleration = nullptr, *joint_load = nullptr,
+         *drive_torque = nullptr;
   double *kinetic_energy = nullptr, *potential_energy = nullptr;
 };
 
@@ -47,7 +48,8 @@ class Simulation : private OdeSystem {
   /// Fixes the drives and starts at t0. Rates of locked joints must be zero.
   void start(double t0, const double* q0, const double* v0);
 
-  /// Steps until t is covered, then writes the sample there. False when the run stopped: see stop().
+  /// Steps until t is covered, then writes the sample there. False when the run stopped: see
+  /// stop().
   bool advance(double t, const Sample& sample);
 
   const Stop& stop() const { return stop_; }
@@ -62,7 +64,8 @@ class Simulation : private OdeSystem {
   void normalise(double* y) override;
   void accepted(double t, const double* y) override;
 
-  bool accelerations(DynamicsMethod& method, double t, const double* q, const double* v, double* du, double* loads);
+  bool accelerations(DynamicsMethod& method, double t, const double* q, const double* v, double* du,
+                     double* loads);
   void record_failure(double t, const DynamicsReport& report, const double* du);
   bool write_sample(double t, const Sample& sample);
 

@@ -64,10 +64,11 @@ LW_INLINE void subtract_outer(ArticulatedInertia<S>& Y, const Force<S>& V, const
   }
 }
 
-/// X^T Y X: the inertia seen at the parent frame, B' = R^T B R - A' r~, and with G = B', H = R^T B R:
-/// C' = R^T C R + r~ G - H^T r~.
+/// X^T Y X: the inertia seen at the parent frame, B' = R^T B R - A' r~, and with G = B', H = R^T B
+/// R: C' = R^T C R + r~ G - H^T r~.
 template <class S, class T>
-LW_INLINE ArticulatedInertia<Wider<S, T>> transform_to_parent(const Transform<T>& X, const ArticulatedInertia<S>& Y) {
+LW_INLINE ArticulatedInertia<Wider<S, T>> transform_to_parent(const Transform<T>& X,
+                                                              const ArticulatedInertia<S>& Y) {
   using W = Wider<S, T>;
   const Sym3<W> A = congruence(X.R, Y.A);
   const Mat3<W> H = congruence(X.R, Y.B);

@@ -58,7 +58,8 @@ inline Compliance<double> invert_inertia(const Inertia<double>& M) {
   Compliance<double> out;
   out.C_ = inverse(central);
   const auto& J = out.C_;
-  const Vec3<double> columns[3] = {{J.m[0], J.m[1], J.m[3]}, {J.m[1], J.m[2], J.m[4]}, {J.m[3], J.m[4], J.m[5]}};
+  const Vec3<double> columns[3] = {
+      {J.m[0], J.m[1], J.m[3]}, {J.m[1], J.m[2], J.m[4]}, {J.m[3], J.m[4], J.m[5]}};
   for (int j = 0; j < 3; ++j) {
     const Vec3<double> b = cross(c, columns[j]);
     out.B.m[j] = b.x;

@@ -82,7 +82,8 @@ LW_INLINE Mat3<Wider<A, B>> operator*(const Mat3<A>& a, const Mat3<B>& b) {
   for (int i = 0; i < 3; ++i)
 #pragma GCC unroll 3
     for (int j = 0; j < 3; ++j)
-      c.m[3 * i + j] = a.m[3 * i] * b.m[j] + a.m[3 * i + 1] * b.m[3 + j] + a.m[3 * i + 2] * b.m[6 + j];
+      c.m[3 * i + j] =
+          a.m[3 * i] * b.m[j] + a.m[3 * i + 1] * b.m[3 + j] + a.m[3 * i + 2] * b.m[6 + j];
   return c;
 }
 template <class A>
@@ -112,7 +113,8 @@ LW_INLINE Sym3<Wider<A, B>> congruence(const Mat3<A>& R, const Sym3<B>& S) {
   for (int i = 0; i < 3; ++i)
 #pragma GCC unroll 3
     for (int j = 0; j < 3; ++j)
-      t.m[3 * i + j] = S.m[sym_index(i, 0)] * R.m[j] + S.m[sym_index(i, 1)] * R.m[3 + j] + S.m[sym_index(i, 2)] * R.m[6 + j];
+      t.m[3 * i + j] = S.m[sym_index(i, 0)] * R.m[j] + S.m[sym_index(i, 1)] * R.m[3 + j] +
+                       S.m[sym_index(i, 2)] * R.m[6 + j];
   Sym3<Wider<A, B>> y;
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i)
