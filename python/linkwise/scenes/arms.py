@@ -1,4 +1,4 @@
-"""Space manipulators of the literature, on a fixed base and without gravity unless asked otherwise."""
+"""Space manipulators of the literature, on a fixed base, without gravity unless asked for."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WEIGHTLESS = (0.0, 0.0, 0.0)
 
 
 class _Segment(NamedTuple):
-    """A body along x: its mass, length and inertia about its inboard joint, and the joint before it."""
+    """A body along x, its inertia about its inboard joint, and that joint."""
 
     joint: str
     axis: tuple[int, int, int]
@@ -26,8 +26,8 @@ class _Segment(NamedTuple):
     inertia: tuple[float, float, float]
 
 
-# [nguyen1994]: Shuttle Remote Manipulator System. Only inertias about the joint frames are published,
-# no first moments, so every centre of mass is taken at the joint.
+# [nguyen1994]: Shuttle Remote Manipulator System. Only inertias about the joint frames are
+# published, no first moments, so every centre of mass is taken at the joint.
 _SRMS = (
     _Segment("base", (0, 0, 0), np.inf, 63.24, 0.5172, (3.664, 3.803, 0.686)),
     _Segment("shoulder_yaw", (0, 0, 1), 1570, 32.12, 0.3048, (1.115, 1.417, 0.595)),
@@ -111,9 +111,10 @@ def _link(segment: _Segment) -> str:
 def srms_3l5d(*, gravity: Sequence[float] = WEIGHTLESS) -> Model:
     """Stand-in for the manipulator of [sharf1993]: 3 links, 5 degrees of freedom (SRMS-3L5D).
 
-    Uniform solid rods along x with the lengths and masses of the Shuttle's arm [nguyen1994]. Shoulder
-    yaw and pitch are one universal joint, elbow pitch a revolute one, wrist pitch and yaw universal
-    again: A f = b has 4 + 5 + 4 = 13 unknowns. q = (yaw, pitch, elbow, wrist pitch, wrist yaw).
+    Uniform solid rods along x with the lengths and masses of the Shuttle's arm [nguyen1994].
+    Shoulder yaw and pitch are one universal joint, elbow pitch a revolute one, wrist pitch and yaw
+    universal again: A f = b has 4 + 5 + 4 = 13 unknowns.
+    q = (yaw, pitch, elbow, wrist pitch, wrist yaw).
     """
     builder = ModelBuilder("srms_3l5d", gravity=gravity)
     builder.add_link("base")

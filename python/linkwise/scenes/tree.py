@@ -28,7 +28,7 @@ def tree(
     floating_base: bool = False,
     seed: int = 0,
 ) -> Model:
-    """A balanced tree of rods: rod i carries the rods branching * i + 1, ..., branching * i + branching.
+    """A balanced tree of rods: rod i carries rods branching * i + 1 to branching * (i + 1).
 
     The children of a rod start at its end and are fanned out about z, 60 degrees from it. Arguments
     and errors as in :func:`linkwise.scenes.chain`; ``branching`` 1 is a chain.
@@ -75,7 +75,7 @@ def _axis(joint: str, directions: np.ndarray, i: int, damping: float) -> dict[st
 
 
 def _fan(place: int, branching: int) -> np.ndarray:
-    """Rotation (3, 3) of child ``place`` of ``branching``: 60 degrees away from straight, turned about z."""
+    """Rotation (3, 3) of child ``place``: 60 degrees away from straight, turned about z."""
     if branching == 1:
         return np.eye(3)
     turn, tilt = 2 * np.pi * place / branching, np.pi / 3
