@@ -124,6 +124,15 @@ class ModelBuilder {
     spec.joints.push_back(std::move(joint));
   }
 
+  void add_note(const std::string& level, std::string element, std::string text) {
+    if (level != "merge" && level != "warning" && level != "info")
+      throw InputError("note level '" + level + "' is unknown; known: merge, warning, info");
+    spec.notes.push_back({level == "merge"     ? NoteLevel::merge
+                          : level == "warning" ? NoteLevel::warning
+                                               : NoteLevel::info,
+                          std::move(element), std::move(text)});
+  }
+
   ModelSpec spec;
 };
 
@@ -263,6 +272,11 @@ void bind_model(nb::module_& m) {
            "rest_position, armature, lower, upper, effort, velocity, limit_stiffness, "
            "limit_damping.")
       .def(
+          "add_note", &ModelBuilder::add_note, "level"_a, "element"_a, "text"_a,
+          "Adds a note for Model.notes, as readers of files do about what they leave out; level is "
+          "\"merge\",\n"
+          "\"warning\" or \"info\".")
+      .def(
           "set_floating_base",
           [](ModelBuilder& self, std::string joint_name) {
             self.spec.floating_base = true;
@@ -394,7 +408,7 @@ void bind_model(nb::module_& m) {
             const auto& g = s.model->gravity;
             return to_numpy({g.x, g.y, g.z});
           },
-          "m/s2, world axes.")
+          nb::rv_policy::move, "m/s2, world axes.")
       .def_prop_ro(
           "notes", [](const PyModel& s) { return s.model->notes; },
           "What was merged and what to beware of.")

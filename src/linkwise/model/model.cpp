@@ -57,20 +57,25 @@ bool massless(const Inertia<double>& M) {
   return M.m == 0 && std::all_of(M.I.m, M.I.m + 6, [](double x) { return x == 0; });
 }
 
+/// Inertia about the centre of mass; M.m > 0.
+Sym3<double> central(const Inertia<double>& M) {
+  const auto c = (1 / M.m) * M.mc;
+  Sym3<double> out = M.I;
+  const double m = M.m;
+  out.m[0] -= m * (c.y * c.y + c.z * c.z);
+  out.m[1] += m * c.x * c.y;
+  out.m[2] -= m * (c.x * c.x + c.z * c.z);
+  out.m[3] += m * c.x * c.z;
+  out.m[4] += m * c.y * c.z;
+  out.m[5] -= m * (c.x * c.x + c.y * c.y);
+  return out;
+}
+
 /// Singular as a 6x6 matrix: no mass, or no rotational inertia about some axis through the centre.
 bool singular(const Inertia<double>& M) {
   if (!(M.m > 0)) return true;
-  const auto c = (1 / M.m) * M.mc;
-  Sym3<double> central = M.I;
-  const double m = M.m;
-  central.m[0] -= m * (c.y * c.y + c.z * c.z);
-  central.m[1] += m * c.x * c.y;
-  central.m[2] -= m * (c.x * c.x + c.z * c.z);
-  central.m[3] += m * c.x * c.z;
-  central.m[4] += m * c.y * c.z;
-  central.m[5] -= m * (c.x * c.x + c.y * c.y);
   double principal[3], whole[3];
-  principal_moments(central, principal);
+  principal_moments(central(M), principal);
   principal_moments(M.I, whole);
   return principal[0] <= 1e-12 * whole[2];
 }
@@ -125,6 +130,7 @@ class ModelAssembly {
     place_joints();
     make_bodies();
     make_runs();
+    m.notes.insert(m.notes.end(), spec.notes.begin(), spec.notes.end());
   }
 
  private:
@@ -271,6 +277,29 @@ class ModelAssembly {
     for (int j : order)
       if (!welded[j]) ++moving_children[lead[parent_link[j]]];
     if (!spec.floating_base) m.total_mass_ -= lumped[root].m;
+    for (int l = 0; l < n_links; ++l) check_inertia(l);
+  }
+
+  /// A clearly negative principal moment is an error, except on a welded link where the sum with
+  /// what it is welded to is a possible inertia: robots in use carry such antennas and sensors.
+  void check_inertia(int l) {
+    const LinkSpec& link = spec.links[l];
+    double principal[3];
+    principal_moments(link.inertia, principal);
+    if (!clearly_negative(link.mass, principal)) return;
+    const Inertia<double>& sum = lumped[lead[l]];
+    if (lead[l] != l && sum.m > 0) {
+      double of_sum[3];
+      principal_moments(central(sum), of_sum);
+      if (!clearly_negative(sum.m, of_sum)) {
+        m.notes.push_back({NoteLevel::warning, link.name,
+                           "inertia has a negative principal moment: no real body has it"});
+        return;
+      }
+    }
+    fail("link '" + link.name + "'" + where + ": inertia has a negative principal moment (" +
+         std::to_string(principal[0]) +
+         " kg m2); give a positive semidefinite inertia about the centre of mass");
   }
 
   /// Massless leads: one moving child -> part of its stack; none -> error; several -> kept,

@@ -84,12 +84,6 @@ struct LinkInfo {
   Transform<double> placement;  ///< joint's user frame -> link frame
 };
 
-enum class NoteLevel { merge, warning, info };
-struct Note {
-  NoteLevel level;
-  std::string element, text;
-};
-
 class Model {
  public:
   /// Validates and builds. Throws InputError naming the element and the remedy.

@@ -132,6 +132,12 @@ std::string serialize(const ModelSpec& spec) {
       w.reals(d.values.data(), d.values.size());
     }
   }
+  w.number<std::uint64_t>(spec.notes.size());
+  for (const auto& n : spec.notes) {
+    w.number(n.level);
+    w.text(n.element);
+    w.text(n.text);
+  }
   return std::move(w.bytes);
 }
 
@@ -179,6 +185,12 @@ ModelSpec deserialize(const std::string& bytes) {
       d.values.resize(r.count());
       r.take(d.values.data(), d.values.size() * sizeof(double));
     }
+  }
+  spec.notes.resize(r.count());
+  for (auto& n : spec.notes) {
+    n.level = r.number<NoteLevel>();
+    n.element = r.text();
+    n.text = r.text();
   }
   return spec;
 }

@@ -95,6 +95,13 @@ struct JointSpec {
   std::vector<DofValue> dof;
 };
 
+enum class NoteLevel { merge, warning, info };
+/// What building a model merged, what to beware of, what a reader left out.
+struct Note {
+  NoteLevel level;
+  std::string element, text;
+};
+
 struct ModelSpec {
   std::string name = "model", source;
   Vec3<double> gravity{0, 0, -9.81};
@@ -104,6 +111,7 @@ struct ModelSpec {
   std::vector<std::string> prescribed;  ///< joints whose motion is given; see Model
   std::vector<LinkSpec> links;
   std::vector<JointSpec> joints;
+  std::vector<Note> notes;  ///< of whoever read the model from a file
 };
 
 /// Degrees of freedom of a joint type; a composite has one per axis.

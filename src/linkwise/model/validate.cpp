@@ -58,6 +58,12 @@ void principal_moments(const Sym3<double>& I, double out[3]) {
   out[2] = largest * scale;
 }
 
+bool clearly_negative(double mass, const double principal[3]) {
+  // CAD programs print noise such as -1e-20 kg m2: what a radius of gyration of a micrometre gives
+  // is no inertia that anybody meant.
+  return principal[0] < -std::max(1e-6 * principal[2], 1e-12 * mass);
+}
+
 void validate_link(const LinkSpec& link, const std::string& where, std::vector<Note>& notes) {
   const std::string head = "link '" + link.name + "'" + where + ": ";
   if (link.name.empty())
@@ -73,15 +79,12 @@ void validate_link(const LinkSpec& link, const std::string& where, std::vector<N
   double principal[3];
   principal_moments(link.inertia, principal);
   const double scale = std::max(std::abs(principal[0]), std::abs(principal[2]));
-  if (principal[0] < -1e-6 * scale)
-    throw InputError(head + "inertia has a negative principal moment (" +
-                     std::to_string(principal[0]) +
-                     " kg m2); give a positive semidefinite inertia about the centre of mass");
   if (link.mass == 0 && scale > 0)
     notes.push_back({NoteLevel::warning, link.name, "has rotational inertia but no mass"});
   if (link.mass > 0 && principal[0] <= 1e-12 * scale)
     notes.push_back({NoteLevel::warning, link.name, "a principal moment of inertia is zero"});
-  else if (scale > 0 && principal[0] + principal[1] < principal[2] * (1 - 1e-9))
+  else if (scale > 0 && !clearly_negative(link.mass, principal) &&
+           principal[0] + principal[1] < principal[2] * (1 - 1e-9))
     notes.push_back(
         {NoteLevel::warning, link.name,
          "principal moments of inertia break the triangle inequality: no real body has them"});

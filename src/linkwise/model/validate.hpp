@@ -8,8 +8,12 @@
 
 namespace linkwise {
 
-/// Throws InputError on non-finite numbers, a negative mass or a clearly negative principal
-/// inertia; adds a warning note on a broken triangle inequality or a vanishing principal inertia.
+/// Whether ascending principal moments are negative beyond the rounding of printed numbers.
+bool clearly_negative(double mass, const double principal[3]);
+
+/// Throws InputError on non-finite numbers or a negative mass; adds a warning note on a broken
+/// triangle inequality or a vanishing principal inertia. Negative inertias are judged later, once
+/// the welded links are summed.
 void validate_link(const LinkSpec& link, const std::string& where, std::vector<Note>& notes);
 
 /// Throws InputError on non-finite numbers, a placement that is no rotation, or a zero or missing
