@@ -1,0 +1,93 @@
+"""Checking what `simulate` is given: one line with the argument, its value and the remedy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise._core import InputError
+
+_DEFAULT_SAMPLES = 1000
+_MAX_SAMPLES = 100_000_000
+
+
+def number(name: str, value: Any) -> float:
+    """A finite number above zero, or an InputError that says which argument is wrong."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: {value!r} is not a number") from None
+    if not np.isfinite(number) or number <= 0:
+        raise InputError(f"{name}: {number:g} given; give a finite number above 0")
+    return number
+
+
+def optional_number(name: str, value: Any) -> float | None:
+    return None if value is None else number(name, value)
+
+
+def optional_count(name: str, value: Any) -> int | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise InputError(f"{name}: {value!r} given; give a whole number of at least 1")
+    return int(value)
+
+
+def state_vector(
+    name: str, values: Any, size: int, default: npt.ArrayLike
+) -> npt.NDArray[np.float64]:
+    """Initial q or v as a vector of `size` finite numbers."""
+    try:
+        array = np.array(default if values is None else values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected an array of {size} numbers") from None
+    if array.shape != (size,):
+        raise InputError(f"{name}: expected shape ({size},), given shape {array.shape}")
+    if not np.all(np.isfinite(array)):
+        bad = int(np.flatnonzero(~np.isfinite(array))[0])
+        raise InputError(f"{name}: expected {size} finite numbers, {name}[{bad}] is {array[bad]}")
+    return array
+
+
+def sample_times(
+    duration: float | None = None,
+    every: float | None = None,
+    times: npt.ArrayLike | None = None,
+) -> npt.NDArray[np.float64]:
+    """The times to record: `times` themselves, or 0, `every`, ... and the end."""
+    if times is not None:
+        return _given_times(times, duration, every)
+    if duration is None:
+        raise InputError("duration: missing; give the seconds to simulate")
+    end = number("duration", duration)
+    spacing = end / _DEFAULT_SAMPLES if every is None else number("every", every)
+    count = end / spacing
+    if count > _MAX_SAMPLES:
+        raise InputError(f"every: {spacing:g} s makes {count:.3g} samples; give a longer interval")
+    # A whole number of intervals, up to rounding, ends exactly at the duration; otherwise what
+    # is left over becomes a shorter interval of its own.
+    whole = round(count)
+    if whole >= 1 and abs(count - whole) <= 1e-9 * count:
+        return np.linspace(0.0, end, whole + 1)
+    return np.append(spacing * np.arange(int(count) + 1), end)
+
+
+def _given_times(
+    times: npt.ArrayLike, duration: float | None, every: float | None
+) -> npt.NDArray[np.float64]:
+    if every is not None:
+        raise InputError("every and times: give one of them")
+    try:
+        listed = np.array(times, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("times: expected an array of numbers, in seconds") from None
+    if listed.ndim != 1 or listed.size == 0:
+        raise InputError(f"times: expected shape (n,) with n > 0, given shape {listed.shape}")
+    if not np.all(np.isfinite(listed)) or listed[0] < 0 or np.any(np.diff(listed) <= 0):
+        raise InputError("times: expected finite, increasing times from 0 on, in seconds")
+    if duration is not None and listed[-1] > number("duration", duration):
+        raise InputError(f"times: the last, {listed[-1]:g} s, is after duration = {duration:g} s")
+    return listed

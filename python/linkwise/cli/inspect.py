@@ -1,0 +1,172 @@
+"""`linkwise inspect`: what is in a model file, and what became of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from linkwise.cli.output import JsonOption, console, number, print_json, table, text
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
+
+_MOST_ROWS = 60
+
+
+def inspect(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="Model file (URDF, MJCF) or scenario.")
+    ],
+    floating_base: Annotated[
+        bool, typer.Option("--floating-base", help="Let the root link float.")
+    ] = False,
+    package_dir: Annotated[
+        list[Path] | None,
+        typer.Option("--package-dir", help="Where packages of package:// paths are; repeatable."),
+    ] = None,
+    every_row: Annotated[bool, typer.Option("--all", help="Show all rows of long models.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the joints, bodies and masses of MODEL, what was merged and why, and warnings."""
+    found = describe_model(_load(model, floating_base, package_dir or []))
+    if as_json:
+        print_json(found)
+        return
+    screen = console()
+    screen.print(_headline(found), markup=False)
+    most = len(found["joints"]) if every_row else _MOST_ROWS
+    screen.print(_joint_table(found["joints"], most))
+    notes = found["notes"]
+    if notes:
+        screen.print(_note_table(notes, len(notes) if every_row else _MOST_ROWS))
+
+
+def _load(path: Path, floating_base: bool, package_dirs: Sequence[Path]) -> Model:
+    from linkwise.io.load import load
+    from linkwise.io.scenario import load_scenario
+
+    if path.suffix.lower() == ".toml":
+        return load_scenario(path).load_model()
+    return load(path, floating_base=floating_base, package_dirs=package_dirs)
+
+
+def describe_model(model: Model) -> dict[str, Any]:
+    """The model as plain data: what the tables and `--json` show."""
+    names, types, bodies = model.joint_names, model.joint_types, model.body_names
+    parents, axes, masses = model.joint_parents, model.joint_axes, model.body_masses.tolist()
+    limits = {
+        key: getattr(model, f"{key}_limit").tolist()
+        for key in ("lower", "upper", "effort", "velocity")
+    }
+    joints = []
+    first = 0
+    for k, count in enumerate(model.joint_nv):
+        span = slice(first, first + count)
+        first += count
+        joints.append(
+            {
+                "joint": names[k],
+                "type": types[k],
+                "axes": [{"kind": kind, "axis": axis} for kind, axis in axes[k]],
+                "parent": bodies[parents[k]] if parents[k] >= 0 else None,
+                "body": bodies[k],
+                "mass": masses[k],
+                "degrees_of_freedom": count,
+                **{key: values[span] for key, values in limits.items()},
+            }
+        )
+    return {
+        "model": model.name,
+        "source": model.source,
+        "hash": model.hash,
+        "links": len(model.link_names),
+        "bodies": model.n_bodies,
+        "nq": model.nq,
+        "nv": model.nv,
+        "total_mass": model.total_mass,
+        "gravity": model.gravity,
+        "joints": joints,
+        "notes": [{"level": n.level, "element": n.element, "text": n.text} for n in model.notes],
+    }
+
+
+def _plural(count: int, noun: str, nouns: str = "") -> str:
+    return f"{count} {noun if count == 1 else nouns or noun + 's'}"
+
+
+def _headline(found: dict[str, Any]) -> str:
+    """Counts in a sentence."""
+    source = f" ({text(found['source'])})" if found["source"] else ""
+    gravity = ", ".join(number(component) for component in found["gravity"].tolist())
+    freedom = _plural(found["nv"], "degree of freedom", "degrees of freedom")
+    links = _plural(found["links"], "link")
+    bodies = _plural(found["bodies"], "moving body", "moving bodies")
+    return (
+        f"{text(found['model'])}{source}: {links} in {bodies}, "
+        f"{freedom} ({_plural(found['nq'], 'coordinate')}), {number(found['total_mass'], 6)} kg, "
+        f"gravity ({gravity}) m/s2"
+    )
+
+
+def _axis(axis: Sequence[float]) -> str:
+    """x, -z or components to three digits."""
+    for letter, component in zip("xyz", axis, strict=True):
+        if abs(component) == 1:
+            return letter if component > 0 else f"-{letter}"
+    return "(" + " ".join(f"{c:.3g}" for c in axis) + ")"
+
+
+def _axes_cell(joint: dict[str, Any]) -> str:
+    single = len(joint["axes"]) == 1 or joint["type"] in ("universal", "cylindrical")
+    axes = [_axis(a["axis"]) for a in joint["axes"]]
+    if joint["type"] == "cylindrical":
+        axes = axes[:1]
+    if single:
+        return ", ".join(axes)
+    return ", ".join(f"{a['kind']} {axis}" for a, axis in zip(joint["axes"], axes, strict=True))
+
+
+def _limits_cell(joint: dict[str, Any]) -> str:
+    """Lower and upper, a pair a degree of freedom; nothing where none is limited."""
+    pairs = list(zip(joint["lower"], joint["upper"], strict=True))
+    if all(abs(low) == float("inf") and abs(high) == float("inf") for low, high in pairs):
+        return ""
+    return ", ".join(f"{low:.4g} .. {high:.4g}" for low, high in pairs)
+
+
+def _joint_table(joints: Sequence[dict[str, Any]], most: int) -> Any:
+    title = "Joints and the bodies they carry"
+    if len(joints) > most:
+        title += f" (the first {most} of {len(joints)}; --all shows all)"
+    columns = ("joint", "type", "axis", "limits", "effort", "parent", "body", "mass [kg]")
+    right = {"effort", "mass [kg]"}
+    made = table(title, [(name, "right" if name in right else "left") for name in columns])
+    for joint in joints[:most]:
+        made.add_row(
+            text(joint["joint"]),
+            joint["type"],
+            _axes_cell(joint),
+            _limits_cell(joint),
+            ", ".join(filter(None, map(number, joint["effort"]))),
+            text(joint["parent"] or "(ground)"),
+            text(joint["body"]),
+            number(joint["mass"]),
+        )
+    return made
+
+
+def _note_table(notes: Sequence[dict[str, str]], most: int) -> Any:
+    """Warnings first, then what was merged."""
+    order = {"warning": 0, "merge": 1, "info": 2}
+    ranked = sorted(notes, key=lambda note: order.get(note["level"], 3))
+    title = "Notes"
+    if len(notes) > most:
+        title += f" (the first {most} of {len(notes)}; --all shows all)"
+    made = table(title, [("", "left"), ("element", "left"), ("what and why", "left")])
+    for note in ranked[:most]:
+        style = "yellow" if note["level"] == "warning" else ""
+        made.add_row(note["level"], text(note["element"]), text(note["text"]), style=style)
+    return made

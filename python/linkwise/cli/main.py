@@ -1,0 +1,106 @@
+"""The `linkwise` program: commands, and exceptions turned into one line and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated, NoReturn
+
+import typer
+
+from linkwise.cli.demo import demo
+from linkwise.cli.inspect import inspect
+from linkwise.cli.output import DONE, FAILED, WRONG_INPUT, print_json, say
+from linkwise.cli.run import run
+
+app = typer.Typer(
+    name="linkwise",
+    help="Simulate mechanisms and find the load of every joint.",
+    epilog="Exit codes: 0 done, 1 the simulation failed, 2 the input is wrong.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command()(demo)
+app.command()(inspect)
+app.command()(run)
+
+# Typer re-exports BadParameter, a UsageError, which is a ClickException: the class of every
+# complaint about the command line, wherever this version of Typer keeps it.
+_CommandLineError: type[Exception] = typer.BadParameter.__mro__[2]
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from linkwise.record.provenance import versions
+
+        print(f"linkwise {versions()['linkwise']}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    pass
+
+
+def _complain(message: str, code: int) -> int:
+    """One line on stderr; with --json also an object on stdout, which is never left empty."""
+    line = say(message)
+    if "--json" in sys.argv[1:]:
+        print_json({"error": line, "exit_code": code})
+    return code
+
+
+def _usage_message(error: Exception) -> str:
+    context = getattr(error, "ctx", None)
+    command = getattr(context, "command_path", "linkwise")
+    text = str(getattr(error, "format_message", lambda: error)())
+    return f"{text.rstrip('.')}; see '{command} --help'"
+
+
+def _is_wrong_input(error: Exception) -> bool:
+    """Whether `error` is an InputError, without importing the core for it."""
+    core = sys.modules.get("linkwise._core")
+    return core is not None and isinstance(error, core.InputError)
+
+
+def _exit_code() -> int:
+    try:
+        # Not standalone: Typer would print framed messages of several lines.
+        result = app(standalone_mode=False, prog_name="linkwise")
+    except _CommandLineError as error:
+        # Without any command the "error" is the help text.
+        if type(error).__name__ == "NoArgsIsHelpError":
+            print(error, file=sys.stderr)
+            return WRONG_INPUT
+        return _complain(_usage_message(error), WRONG_INPUT)
+    except KeyboardInterrupt as error:
+        return _complain(str(error) or "interrupted", FAILED)
+    except Exception as error:
+        if _is_wrong_input(error):
+            return _complain(str(error), WRONG_INPUT)
+        if isinstance(error, BrokenPipeError):
+            raise
+        if os.environ.get("LINKWISE_TRACEBACK"):
+            raise
+        return _complain(f"{type(error).__name__}: {error}", FAILED)
+    return result if isinstance(result, int) else DONE
+
+
+def main() -> NoReturn:
+    """Run the command line of this process and exit."""
+    try:
+        code = _exit_code()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader of a pipe went away (`linkwise inspect x | head`): not a failure, and Python
+        # must not complain about it while it closes stdout.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = DONE
+    sys.exit(code)

@@ -1,0 +1,124 @@
+"""What commands print: tables for people, JSON for programs."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from linkwise.result import Run
+
+DONE, FAILED, WRONG_INPUT = 0, 1, 2
+
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else there.")
+]
+
+
+def _valid(value: Any) -> Any:
+    """`value` in types that JSON has; infinities and NaN, which it lacks, become null."""
+    if hasattr(value, "tolist"):  # NumPy arrays and scalars
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _valid(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_valid(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return str(value)
+
+
+def say(message: str) -> str:
+    """One line on stderr, whatever the message holds; returns it."""
+    line = " ".join(message.split())
+    print(f"linkwise: {line}", file=sys.stderr)
+    return line
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    print(json.dumps(_valid(value), indent=2, allow_nan=False))
+
+
+def console(*, stderr: bool = False) -> Console:
+    """A console for results (stdout) or progress (stderr).
+
+    Rich colours a terminal only, and not when NO_COLOR is set. Off a terminal lines are not folded:
+    what reads them wants whole rows.
+    """
+    from rich.console import Console
+
+    made = Console(stderr=stderr, highlight=False, soft_wrap=False)
+    if not made.is_terminal:
+        made.width = 200
+    return made
+
+
+def table(title: str, columns: Sequence[tuple[str, str]]) -> Table:
+    """A plain table; columns are (heading, "left" or "right")."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    made = Table(title=title or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for heading, justify in columns:
+        made.add_column(heading, justify=justify, overflow="fold")  # type: ignore[arg-type]
+    return made
+
+
+def text(value: object) -> str:
+    """Names come from files: neither Rich markup nor control characters in them take effect."""
+    from rich.markup import escape
+
+    return escape("".join(c if c.isprintable() else "?" for c in str(value)))
+
+
+def number(value: float, digits: int = 4) -> str:
+    return "" if not math.isfinite(value) else f"{value:.{digits}g}"
+
+
+def peak_records(run: Run) -> list[dict[str, Any]]:
+    """Per joint the largest force and moment and when, as plain records."""
+    peaks = run.peak_loads()
+    columns = ("force", "force_time", "moment", "moment_time")
+    values = [peaks[name].values.tolist() for name in columns]
+    return [
+        {"joint": joint, **dict(zip(columns, row, strict=True))}
+        for joint, *row in zip(peaks["joint"].values.tolist(), *values, strict=True)
+    ]
+
+
+def peak_table(records: Sequence[Mapping[str, Any]], limit: int = 40) -> Table:
+    """The records as a table; of many joints those with the largest forces."""
+    shown = list(records)
+    title = "Peak joint loads"
+    if len(shown) > limit:
+        shown = sorted(shown, key=lambda record: -record["force"])[:limit]
+        title += f" (the {limit} largest forces of {len(records)} joints)"
+    made = table(
+        title,
+        [
+            ("joint", "left"),
+            ("force [N]", "right"),
+            ("at [s]", "right"),
+            ("moment [N m]", "right"),
+            ("at [s]", "right"),
+        ],
+    )
+    for record in shown:
+        made.add_row(
+            text(record["joint"]),
+            number(record["force"]),
+            number(record["force_time"]),
+            number(record["moment"]),
+            number(record["moment_time"]),
+        )
+    return made

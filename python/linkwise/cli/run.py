@@ -1,0 +1,95 @@
+"""`linkwise run`: simulate a scenario file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from linkwise.cli.output import (
+    FAILED,
+    JsonOption,
+    console,
+    number,
+    peak_records,
+    peak_table,
+    print_json,
+    say,
+)
+
+if TYPE_CHECKING:
+    from linkwise.result import Run
+
+
+def run(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (TOML).")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="Where to write the results (a Zarr store). An earlier run there is replaced. "
+            "By default [output] path of the scenario, or the scenario's name with .zarr in this "
+            "folder, numbered if it exists.",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Simulate a SCENARIO file and write the results. Ctrl-C keeps those until then."""
+    from linkwise.cli.progress import live_progress
+    from linkwise.io.scenario import load_scenario
+    from linkwise.record.claim import unused_path
+    from linkwise.simulation import SimulationError, SimulationInterrupted, run_scenario
+
+    loaded = load_scenario(scenario)
+    if output is None and loaded.settings.output.path is None:
+        output = unused_path(f"{scenario.stem}.zarr")
+    try:
+        with live_progress(quiet=as_json) as progress:
+            result = run_scenario(loaded, output=output, progress=progress)
+    except (SimulationError, SimulationInterrupted) as stopped:
+        show_run(stopped.run, as_json)
+        say(str(stopped))
+        raise typer.Exit(FAILED) from None
+    show_run(result, as_json)
+
+
+def summary(run: Run) -> dict[str, Any]:
+    """What a program wants to know about a run."""
+    attrs = run.dataset.attrs
+    names = ("outcome", "message", "stop_time", "stop_joint", "wall_time")
+    counts = ("total_steps", "total_evaluations", "total_iterations")
+    chosen = ("model", "model_hash", "method", "solver", "reason")
+    found = {name: attrs.get(name) for name in (*names, *chosen, *counts)}
+    found["run"] = str(run.path) if run.path is not None else None
+    found["samples"] = run.dataset.sizes["time"]
+    return found
+
+
+def has_loads(run: Run) -> bool:
+    return "joint_load" in run and run.dataset.sizes["time"] > 0
+
+
+def _solver(name: str) -> str:
+    return "" if name == "none" else f" with {name}"
+
+
+def show_run(run: Run, as_json: bool) -> None:
+    """How the run went, the peak loads, and where the results are."""
+    peaks = peak_records(run) if has_loads(run) else []
+    if as_json:
+        print_json({**summary(run), "peak_loads": peaks})
+        return
+    attrs = run.dataset.attrs
+    screen = console()
+    if peaks:
+        screen.print(peak_table(peaks))
+    screen.print(
+        f"Simulated {attrs['stop_time']:g} s in {number(attrs['wall_time'], 3)} s: "
+        f"{attrs['total_steps']} steps, {attrs['total_evaluations']} evaluations, "
+        f"by {attrs['method']}{_solver(attrs['solver'])}.",
+        markup=False,
+    )
+    screen.print(f"Results: {run.path}", markup=False)

@@ -1,0 +1,163 @@
+"""Exporting a run to NetCDF and CSV."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise._core import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_BLOCK_BYTES = 64 << 20
+# Scalars of one kind share a table.
+_TOGETHER = {
+    "energy": ("kinetic_energy", "potential_energy"),
+    "statistics": ("steps", "evaluations", "iterations", "step_size", "order"),
+}
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    """A name beside `path` that becomes `path` when all went well: never half a file."""
+    if not path.parent.is_dir():
+        raise InputError(f"{str(path)!r}: folder {str(path.parent)!r} does not exist")
+    if path.is_dir():
+        raise InputError(f"{str(path)!r}: is a folder; give a file name")
+    aside = path.with_name(f".{path.name}.{secrets.token_hex(4)}.new")
+    try:
+        yield aside
+        os.replace(aside, path)
+    except OSError as error:
+        raise InputError(f"{str(path)!r}: cannot write it ({error.strerror or error})") from error
+    finally:
+        aside.unlink(missing_ok=True)
+
+
+def _blocks(variables: list[xr.DataArray]) -> Iterator[slice]:
+    """Slices of time that keep what is read at once small."""
+    count = variables[0].sizes["time"]
+    row = sum(v.nbytes // max(1, count) for v in variables)
+    rows = max(1, _BLOCK_BYTES // max(1, row))
+    for start in range(0, count, rows):
+        yield slice(start, min(start + rows, count))
+
+
+def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """All variables, block by block: a stored run may be larger than memory."""
+    import h5netcdf
+
+    target = Path(path)
+    with _replacing(target) as aside, h5netcdf.File(aside, "w") as file:
+        file.dimensions = {str(name): size for name, size in dataset.sizes.items()}
+        file.attrs.update(dataset.attrs)
+        for name, variable in dataset.variables.items():
+            made = file.create_variable(
+                str(name), tuple(str(dim) for dim in variable.dims), _netcdf_type(variable.dtype)
+            )
+            made.attrs.update(variable.attrs)
+            if name in dataset.coords:
+                made[...] = _netcdf_values(variable.values)
+            else:
+                extra = [str(c) for c in dataset[name].coords if c not in variable.dims]
+                if extra:
+                    made.attrs["coordinates"] = " ".join(extra)
+        timed = [v for v in dataset.data_vars.values() if "time" in v.dims]
+        for where in _blocks(timed) if timed else ():
+            for array in timed:
+                file.variables[str(array.name)][where] = array[where].values
+    return target
+
+
+def _netcdf_type(dtype: np.dtype[Any]) -> Any:
+    if dtype.kind == "U":
+        import h5py
+
+        return h5py.string_dtype()
+    return dtype
+
+
+def _netcdf_values(values: Any) -> Any:
+    return values.astype(object) if values.dtype.kind == "U" else values
+
+
+def _columns(variable: xr.DataArray) -> list[str]:
+    """Headings such as `elbow.fx [N]`; scalars are headed by their own name."""
+    dims = [dim for dim in variable.dims if dim != "time"]
+    labels = [variable[dim].values.tolist() for dim in dims]
+    names = [".".join(map(str, parts)) for parts in itertools.product(*labels)]
+    if not dims:
+        names = [str(variable.name)]
+    units = f"{variable.name}_units"
+    if units in variable.coords:
+        per = variable.coords[units]
+        count = len(names) // per.size
+        listed = per.values.tolist()
+        # Units follow the first dimension of scalars, the last one (components) of loads.
+        unit = listed * count if variable.dims[-1] == per.dims[0] and len(dims) > 1 else listed
+    else:
+        unit = [variable.attrs.get("units", "1")] * len(names)
+    return [
+        name if text == "1" else f"{name} [{text}]" for name, text in zip(names, unit, strict=True)
+    ]
+
+
+def _write_table(dataset: xr.Dataset, names: list[str], path: Path) -> None:
+    variables = [dataset[name] for name in names]
+    headings = ["time [s]", *(column for v in variables for column in _columns(v))]
+    with _replacing(path) as aside, open(aside, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(headings)
+        times = dataset["time"].values
+        for where in _blocks(variables):
+            # Lists of Python numbers print their shortest exact form.
+            parts = [v[where].values.reshape(where.stop - where.start, -1) for v in variables]
+            rows = zip(times[where].tolist(), *(part.tolist() for part in parts), strict=True)
+            table.writerows([time, *itertools.chain(*values)] for time, *values in rows)
+
+
+def write_csv(
+    dataset: xr.Dataset, path: str | os.PathLike[str], quantity: str | None
+) -> list[Path]:
+    target = Path(path)
+    shared = {name: group for group, names in _TOGETHER.items() for name in names}
+    tables: dict[str, list[str]] = {}
+    for key in dataset.data_vars:
+        tables.setdefault(shared.get(str(key), str(key)), []).append(str(key))
+    if quantity is not None and quantity in dataset.data_vars:
+        wanted = {quantity: [quantity]}
+    elif quantity is not None:
+        if quantity not in tables:
+            raise InputError(f"run holds no {quantity!r}; it holds {', '.join(tables)}")
+        wanted = {quantity: tables[quantity]}
+    else:
+        wanted = tables
+    if target.suffix.lower() == ".csv":
+        if len(wanted) != 1:
+            raise InputError(
+                f"{str(path)!r} is one file and the run holds {', '.join(tables)}; "
+                "name one with quantity= or give a folder"
+            )
+        ((_, names),) = wanted.items()
+        _write_table(dataset, names, target)
+        return [target]
+    if target.exists() and not target.is_dir():
+        raise InputError(f"{str(path)!r}: exists and is not a folder; give a folder or a .csv file")
+    try:
+        target.mkdir(exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{str(path)!r}: cannot make the folder ({error.strerror})") from None
+    written = []
+    for name, names in wanted.items():
+        written.append(target / f"{name}.csv")
+        _write_table(dataset, names, written[-1])
+    return written

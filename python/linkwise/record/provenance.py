@@ -1,0 +1,90 @@
+"""Where a run comes from: model, versions, options and machine kind, as flat attributes.
+
+Values are text or numbers only, so that Zarr, NetCDF and JSON all hold them unchanged; nested
+ones are JSON text. Nothing that identifies a person or a machine is recorded.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import platform
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
+
+FORMAT_KEY = "linkwise_run"
+FORMAT_VERSION = 1
+UNFINISHED = "unfinished"
+
+_RECORDED_PACKAGES = ("linkwise", "numpy", "xarray", "zarr")
+
+
+def versions() -> dict[str, str]:
+    found = {"python": platform.python_version()}
+    for package in _RECORDED_PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found
+
+
+def plain(value: Any) -> str | int | float | bool:
+    """A value that every file format keeps: text, number, or JSON text of the rest."""
+    if isinstance(value, (str, bool, int)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    return json.dumps(value, default=str)
+
+
+def describe(drive: Any) -> dict[str, Any]:
+    """A drive or wrench in a few words: its kind, its numbers, the size of its tables."""
+    told: dict[str, Any] = {"kind": type(drive).__name__.lower()}
+    for field in dataclasses.fields(drive):
+        value: Any = getattr(drive, field.name)
+        if hasattr(value, "times"):
+            span = [float(value.times[0]), float(value.times[-1])]
+            told[field.name] = {"table": list(value.values.shape), "times": span}
+        elif callable(value):
+            told[field.name] = f"function {getattr(value, '__qualname__', type(value).__name__)}"
+        else:
+            told[field.name] = value.tolist() if hasattr(value, "tolist") else value
+    return told
+
+
+def model_attrs(model: Model) -> dict[str, Any]:
+    return {
+        "model": model.name,
+        "model_source": PurePath(model.source).name if model.source else "",
+        "model_hash": model.hash,
+        "model_joints": model.n_joints,
+        "model_degrees_of_freedom": model.nv,
+    }
+
+
+def provenance(
+    model: Model, *, options: Mapping[str, Any], scenario: str = "", cpu_target: str = ""
+) -> dict[str, Any]:
+    """Attributes known before the first step."""
+    found = versions()
+    return {
+        FORMAT_KEY: FORMAT_VERSION,
+        "title": f"linkwise run of {model.name}",
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "linkwise_version": found["linkwise"],
+        "versions": json.dumps(found),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "cpu_target": cpu_target,
+        **model_attrs(model),
+        "options": json.dumps(dict(options), default=str),
+        "scenario": scenario,
+        "outcome": UNFINISHED,
+    }

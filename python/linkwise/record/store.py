@@ -1,0 +1,222 @@
+"""A run on disk: a Zarr v3 group, written chunk by chunk along time.
+
+Every array has its full length from the start and reads as "not written" (NaN) until its chunks
+arrive, so nothing but chunk files changes while a run goes on. A chunk file is replaced as a whole
+(zarr >= 3.1.3 writes aside and renames), and the `time` array is written after all others: the
+samples whose time is finite are exactly those that are complete, wherever the process is killed.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import time as clock
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise._core import InputError
+from linkwise.record.claim import check_target, hold, release
+from linkwise.record.provenance import plain
+from linkwise.record.schema import TIME_ATTRS, Array, Coordinate, Schema, Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
+    import zarr
+
+# A block of samples is held in memory and rewritten when flushed early; a chunk is one file.
+BLOCK_BYTES = 32 << 20
+CHUNK_BYTES = 4 << 20
+MAX_BLOCK_ROWS = 4096
+SCALAR_ROWS = 4096
+FLUSH_SECONDS = 2.0
+
+
+def block_rows(schema: Schema, total: int) -> int:
+    """Samples a chunk: many for a small system, few for a large one."""
+    fitting = max(1, BLOCK_BYTES // schema.row_bytes)
+    return int(max(1, min(fitting, MAX_BLOCK_ROWS, total)))
+
+
+def chunk_shape(variable: Variable, rows: int) -> tuple[int, ...]:
+    """Chunks hold one block in time and are cut along joints when they get large.
+
+    Scalars get longer chunks, rewritten with every block: a large system has blocks of few samples,
+    and as many files a scalar would take long to open.
+    """
+    if not variable.shape:
+        return (max(rows, SCALAR_ROWS),)
+    if variable.shape[0] == 0:
+        return (rows, *(max(1, size) for size in variable.shape))
+    first, *rest = variable.shape
+    bytes_each = rows * variable.dtype.itemsize * int(np.prod(rest, dtype=np.int64))
+    return (rows, max(1, min(first, CHUNK_BYTES // max(1, bytes_each))), *rest)
+
+
+class RunWriter:
+    """Writes one run to `path`, which appears at once and whole: a group with no samples yet.
+
+    An existing linkwise run at `path` is replaced; anything else there is refused.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        schema: Schema,
+        attrs: Mapping[str, Any],
+        *,
+        samples: int,
+        flush_seconds: float = FLUSH_SECONDS,
+    ) -> None:
+        import zarr
+
+        self.path = Path(path)
+        check_target(self.path)
+        self._schema = schema
+        self._samples = samples
+        self._rows = block_rows(schema, samples)
+        self._flush_seconds = flush_seconds
+        self._written = 0
+        self._pending: list[tuple[Array, dict[str, Array]]] = []
+        self._waiting = 0
+        self._flushed = clock.monotonic()
+        aside = self.path.with_name(f".{self.path.name}.{secrets.token_hex(4)}.new")
+        try:
+            os.mkdir(aside)
+        except OSError as error:
+            raise InputError(
+                f"output {str(path)!r}: cannot write there ({error.strerror}); choose another path"
+            ) from None
+        self._lock = hold(aside)
+        try:
+            self._create(aside, attrs)
+            _move_into_place(aside, self.path)
+        except BaseException:
+            release(self._lock)
+            shutil.rmtree(aside, ignore_errors=True)
+            raise
+        self._group = zarr.open_group(self.path, mode="r+", zarr_format=3, use_consolidated=False)
+        names = ["time", *(variable.name for variable in schema.variables)]
+        self._arrays: dict[str, Any] = {name: self._group[name] for name in names}
+
+    def _create(self, where: Path, attrs: Mapping[str, Any]) -> None:
+        import zarr
+
+        group = zarr.open_group(where, mode="a", zarr_format=3)  # "w" would drop the locked folder
+        time = Variable("time", (), (), np.dtype(np.float64), TIME_ATTRS)
+        for variable in (time, *self._schema.variables):
+            whole_numbers = variable.dtype.kind == "i"
+            group.create_array(
+                variable.name,
+                shape=(self._samples, *variable.shape),
+                chunks=chunk_shape(variable, self._rows),
+                dtype=variable.dtype,
+                fill_value=0 if whole_numbers else np.nan,
+                dimension_names=("time", *variable.dims),
+                attributes={**variable.attrs},
+            )
+        for name, coordinate in self._schema.coordinates.items():
+            _create_text(group, name, coordinate)
+        group.update_attributes({name: plain(value) for name, value in attrs.items()})
+
+    def append(self, chunk: Mapping[str, Any]) -> None:
+        """Take what one call of `Simulation.advance` returned."""
+        times = np.array(chunk["time"], dtype=np.float64)
+        if times.size == 0:
+            return
+        if self._written + self._waiting + times.size > self._samples:
+            raise ValueError("more samples than the run was created for")
+        # `rows` may hand out views of the caller's arrays; what is kept must not change later.
+        rows = {v.name: v.rows(chunk, times.size).copy() for v in self._schema.variables}
+        self._pending.append((times, rows))
+        self._waiting += times.size
+        while self._waiting >= self._to_boundary():
+            self._write(self._to_boundary())
+        if self._waiting and clock.monotonic() - self._flushed >= self._flush_seconds:
+            self._write(self._waiting)
+
+    def _to_boundary(self) -> int:
+        """Samples that complete the current chunk."""
+        return min(self._rows, self._samples) - self._written % self._rows
+
+    def _take(self, count: int) -> tuple[Array, dict[str, Array]]:
+        """The first `count` waiting samples, joined."""
+        taken: list[tuple[Array, dict[str, Array]]] = []
+        missing = count
+        while missing:
+            times, rows = self._pending.pop(0)
+            if times.size > missing:
+                rest = {name: values[missing:] for name, values in rows.items()}
+                self._pending.insert(0, (times[missing:], rest))
+                times = times[:missing]
+                rows = {name: values[:missing] for name, values in rows.items()}
+            taken.append((times, rows))
+            missing -= times.size
+        if len(taken) == 1:
+            return taken[0]
+        names = [variable.name for variable in self._schema.variables]
+        joined = {name: np.concatenate([rows[name] for _, rows in taken]) for name in names}
+        return np.concatenate([times for times, _ in taken]), joined
+
+    def _write(self, count: int) -> None:
+        times, rows = self._take(count)
+        self._waiting -= count
+        where = slice(self._written, self._written + count)
+        for name, values in rows.items():
+            self._arrays[name][where] = values
+        self._arrays["time"][where] = times  # last: it says that the others are complete
+        self._written += count
+        self._flushed = clock.monotonic()
+
+    def flush(self) -> None:
+        if self._waiting:
+            self._write(self._waiting)
+
+    def finish(self, attrs: Mapping[str, Any]) -> xr.Dataset:
+        """Write what waits and the final attributes; return the opened results."""
+        from linkwise.record.read import open_dataset
+
+        try:
+            self.flush()
+            self._group.update_attributes({name: plain(value) for name, value in attrs.items()})
+        finally:
+            release(self._lock)
+        return open_dataset(self.path)
+
+
+def _create_text(group: zarr.Group, name: str, coordinate: Coordinate) -> None:
+    """Text as Zarr's `string` type: fixed-width text has no Zarr v3 specification."""
+    values = coordinate.values
+    array = group.create_array(
+        name,
+        shape=values.shape,
+        chunks=tuple(max(1, size) for size in values.shape),
+        dtype="string",
+        dimension_names=coordinate.dims,
+        attributes={**coordinate.attrs},
+    )
+    if values.size:
+        array[:] = values.astype(object)
+
+
+def _move_into_place(new: Path, path: Path) -> None:
+    """Rename `new` to `path`; an old run there is moved away first and deleted afterwards."""
+    old: Path | None = None
+    while True:
+        try:
+            os.rename(new, path)  # refuses a directory that is not empty, so nothing is lost
+            break
+        except OSError as error:
+            check_target(path)
+            if old is not None or not path.exists():
+                raise InputError(
+                    f"output {str(path)!r}: cannot write there ({error.strerror}); "
+                    "choose another path"
+                ) from None
+            old = path.with_name(f".{path.name}.{secrets.token_hex(4)}.old")
+            os.rename(path, old)
+    if old is not None:
+        shutil.rmtree(old, ignore_errors=True)

@@ -1,0 +1,157 @@
+"""Run: the results of one simulation, labelled, with units and provenance."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise._core import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Samples of joint loads looked at in one go, in bytes: a run may be larger than memory.
+_BLOCK_BYTES = 64 << 20
+
+
+class Run:
+    """The results of one simulation.
+
+    Wraps an xarray Dataset, `run.dataset`: attributes and items fall through to it, so that
+    `run.joint_load.sel(joint="elbow")`, `run["position"]`, `run.attrs` and `run.sizes` work.
+    Units, frames and sign conventions are in every variable's `attrs`, the provenance in
+    `run.attrs`.
+
+    Attributes:
+        dataset: The xarray Dataset.
+        path: The Zarr store it is read from, None for a run in memory.
+    """
+
+    def __init__(self, dataset: xr.Dataset, path: str | os.PathLike[str] | None = None) -> None:
+        self.dataset = dataset
+        self.path = None if path is None else Path(path)
+
+    def __getattr__(self, name: str) -> Any:
+        # Only called for what Run itself lacks; while unpickling there is no dataset yet.
+        if name.startswith("__") or name == "dataset":
+            raise AttributeError(name)
+        try:
+            return getattr(self.dataset, name)
+        except AttributeError:
+            held = ", ".join(str(key) for key in self.dataset.data_vars)
+            raise AttributeError(f"run has no {name!r}; it holds {held}") from None
+
+    def __getitem__(self, key: Any) -> Any:
+        return self.dataset[key]
+
+    def __contains__(self, key: object) -> bool:
+        return key in self.dataset
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.dataset)
+
+    def __len__(self) -> int:
+        return len(self.dataset)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *dir(self.dataset)})
+
+    @property
+    def outcome(self) -> str:
+        """ "converged", or how the run ended instead."""
+        return str(self.dataset.attrs.get("outcome", "unknown"))
+
+    @property
+    def completed(self) -> bool:
+        """Whether the run reached its end."""
+        return self.outcome == "converged"
+
+    def __repr__(self) -> str:
+        return "\n".join(self._summary())
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        head = "<br>".join(escape(line) for line in self._summary())
+        return f"<p>{head}</p>{self.dataset._repr_html_()}"
+
+    def _summary(self) -> list[str]:
+        attrs = self.dataset.attrs
+        times = self.dataset["time"].values
+        span = f"t = {times[0]:g} to {times[-1]:g} s" if times.size else "no samples"
+        lines = [
+            f"<linkwise.Run {attrs.get('model', '')!r}: {self.outcome}, {span} "
+            f"in {times.size} samples, {attrs.get('model_joints', '?')} joints>"
+        ]
+        if not self.completed and attrs.get("message"):
+            lines.append(f"  message     {attrs['message']}")
+        for name, variable in self.dataset.data_vars.items():
+            dims = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
+            lines.append(f"  {name!s:<18} ({dims})  {variable.attrs.get('units', '')}")
+        if "method" in attrs:
+            lines.append(f"  computed by {attrs['method']}, {attrs.get('solver', '')}")
+        if self.path is not None:
+            lines.append(f"  stored in   {self.path}")
+        return lines
+
+    def peak_loads(self) -> xr.Dataset:
+        """Largest force and moment that each joint carries, and when.
+
+        Returns:
+            Dataset over `joint`: `force` [N] and `moment` [N m] (magnitudes of the joint load's two
+            halves, the moment about the joint point) with `force_time` and `moment_time` [s].
+
+        Raises:
+            InputError: the run holds no joint loads or no samples.
+        """
+        import xarray as xr
+
+        if "joint_load" not in self.dataset:
+            raise InputError('run holds no joint loads; record the quantity "joint_load"')
+        load = self.dataset["joint_load"].transpose("time", "joint", "component")
+        times = self.dataset["time"].values
+        if times.size == 0:
+            raise InputError("run holds no samples: it stopped before the first was written")
+        count = load.sizes["joint"]
+        largest = np.full((2, count), -1.0)
+        when = np.zeros((2, count))
+        rows = max(1, _BLOCK_BYTES // max(1, 48 * count))
+        for start in range(0, times.size, rows):
+            block = load[start : start + rows].values.reshape(-1, count, 2, 3)
+            size = np.linalg.norm(block, axis=-1)
+            at = np.argmax(size, axis=0)
+            peak = np.take_along_axis(size, at[None], axis=0)[0].T
+            better = peak > largest
+            largest[better] = peak[better]
+            when[better] = times[start + at.T][better]
+        data = {}
+        for k, (name, units) in enumerate((("force", "N"), ("moment", "N m"))):
+            attrs = {"long_name": f"largest joint {name}", "units": units}
+            data[name] = ("joint", largest[k], attrs)
+            at_attrs = {"long_name": f"time of the largest joint {name}", "units": "s"}
+            data[f"{name}_time"] = ("joint", when[k], at_attrs)
+        return xr.Dataset(data, coords={"joint": load["joint"]}, attrs={})
+
+    def to_netcdf(self, path: str | os.PathLike[str]) -> Path:
+        """Write everything to one NetCDF-4 file (also an HDF5 file); replaces an existing file."""
+        from linkwise.record.export import write_netcdf
+
+        return write_netcdf(self.dataset, path)
+
+    def to_csv(self, path: str | os.PathLike[str], quantity: str | None = None) -> list[Path]:
+        """Write tables with a row a sample and a column a scalar, the first one `time [s]`.
+
+        Args:
+            path: A folder, which gets one file a quantity, or a `.csv` file for one quantity.
+            quantity: Which one, when `path` is a file: a variable's name, "energy" or "statistics".
+
+        Returns:
+            The files written.
+        """
+        from linkwise.record.export import write_csv
+
+        return write_csv(self.dataset, path, quantity)

@@ -1,0 +1,280 @@
+"""Simulating a model: from its drives to labelled results, in memory or on disk."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import time as clock
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise import _core
+from linkwise._core import InputError
+from linkwise.arguments import number, optional_count, optional_number, sample_times, state_vector
+from linkwise.drives import as_drive, as_wrench
+from linkwise.io.complaint import near
+from linkwise.record.claim import check_target
+from linkwise.record.memory import MemoryRecord
+from linkwise.record.provenance import describe, provenance
+from linkwise.record.schema import Schema, build_schema
+from linkwise.result import Run
+from linkwise.time_loop import Ending, Progress, run_time_loop
+
+if TYPE_CHECKING:
+    from linkwise._core import Model, Simulation
+    from linkwise.drives import Drive, Wrench
+    from linkwise.io.scenario import Scenario
+    from linkwise.record.store import RunWriter
+
+
+class SimulationError(RuntimeError):
+    """A simulation that could not go on; `run` holds everything until then."""
+
+    def __init__(self, message: str, run: Run) -> None:
+        super().__init__(message)
+        self.run = run
+
+
+class SimulationInterrupted(KeyboardInterrupt):
+    """Ctrl-C during a simulation; `run` holds everything until then."""
+
+    def __init__(self, message: str, run: Run) -> None:
+        super().__init__(message)
+        self.run = run
+
+
+def _check_driven(
+    model: Model, drives: Mapping[str, Any] | None, wrenches: Mapping[str, Any] | None
+) -> tuple[dict[str, Drive], dict[str, Wrench]]:
+    """Drives by joint and wrenches by body; unknown names and unusable values are refused."""
+    by_joint, by_body = {}, {}
+    for joint, drive in (drives or {}).items():
+        model.joint_index(joint)
+        try:
+            by_joint[joint] = as_drive(drive)
+        except InputError as error:
+            raise InputError(f"drives[{joint!r}]: {error}") from None
+    bodies = {*model.body_names, *model.link_names} if wrenches else set()
+    for body, wrench in (wrenches or {}).items():
+        if body not in bodies:
+            raise InputError(f"wrenches: unknown body {body!r}; {near(body, model.body_names)}")
+        try:
+            by_body[body] = as_wrench(wrench)
+        except InputError as error:
+            raise InputError(f"wrenches[{body!r}]: {error}") from None
+    return by_joint, by_body
+
+
+def _chosen(
+    simulation: Simulation, drives: Mapping[str, Drive], wrenches: Mapping[str, Wrench]
+) -> dict[str, Any]:
+    """Attributes that the prepared simulation adds to the provenance."""
+    return {
+        "drives": json.dumps({joint: describe(drive) for joint, drive in drives.items()}),
+        "wrenches": json.dumps({body: describe(wrench) for body, wrench in wrenches.items()}),
+        "method": simulation.method,
+        "solver": simulation.solver or "none",
+        "reason": simulation.reason,
+    }
+
+
+def _recorder(
+    schema: Schema, attrs: Mapping[str, Any], samples: int, output: str | os.PathLike[str] | None
+) -> MemoryRecord | RunWriter:
+    if output is None:
+        return MemoryRecord(schema, attrs)
+    from linkwise.record.store import RunWriter
+
+    return RunWriter(output, schema, attrs, samples=samples)
+
+
+def _record(
+    simulation: Simulation,
+    record: MemoryRecord | RunWriter,
+    schema: Schema,
+    times: npt.NDArray[np.float64],
+    progress: Callable[[Progress], object] | None,
+) -> tuple[Run, Ending]:
+    """Simulate and record; whatever goes wrong, what was recorded is completed to a run."""
+    started = clock.monotonic()
+    try:
+        ending = run_time_loop(simulation, record, schema, times, progress)
+    except BaseException as error:
+        # A function of the caller's (a drive, the progress) raised, or the disk is full.
+        said = {"outcome": "error", "message": f"{type(error).__name__}: {error}"}
+        with contextlib.suppress(Exception):
+            record.finish(said)
+        raise
+    finished = record.finish(_attributes_at_end(ending, clock.monotonic() - started))
+    return Run(finished, record.path), ending
+
+
+def _attributes_at_end(ending: Ending, wall_time: float) -> dict[str, Any]:
+    return {
+        "outcome": ending.outcome,
+        "message": ending.message,
+        "stop_time": ending.time,
+        "stop_joint": ending.joint,
+        "wall_time": wall_time,
+        "total_steps": ending.counters["steps"],
+        "total_evaluations": ending.counters["evaluations"],
+        "total_iterations": ending.counters["iterations"],
+    }
+
+
+def failure_message(model: Model, ending: Ending) -> str:
+    """One line: what happened, when, where, and (from the core) what to do."""
+    joint = f", joint {ending.joint!r}" if ending.joint else ""
+    detail = f": {ending.message}" if ending.message else ""
+    return (
+        f"simulation of {model.name!r} stopped at t = {ending.time:.6g} s with outcome "
+        f"{ending.outcome}{joint}{detail}"
+    )
+
+
+def simulate(
+    model: Model,
+    *,
+    duration: float | None = None,
+    drives: Mapping[str, Drive | Any] | None = None,
+    wrenches: Mapping[str, Wrench] | None = None,
+    q0: npt.ArrayLike | None = None,
+    v0: npt.ArrayLike | None = None,
+    every: float | None = None,
+    times: npt.ArrayLike | None = None,
+    tolerance: float = 1e-6,
+    integrator: str = "adams",
+    method: str = "auto",
+    solver: str = "auto",
+    initial_guess: str = "cubic",
+    stop: str = "energy_norm",
+    solver_tolerance: float | None = None,
+    max_iterations: int | None = None,
+    step: float | None = None,
+    max_step: float | None = None,
+    threads: int | None = None,
+    quantities: Collection[str] | None = None,
+    joints: Sequence[str] | None = None,
+    output: str | os.PathLike[str] | None = None,
+    progress: Callable[[Progress], object] | None = None,
+    on_failure: Literal["raise", "return"] = "raise",
+    scenario_text: str = "",
+) -> Run:
+    """Simulate the motion of `model` from time 0 and return labelled results.
+
+    Args:
+        model: The mechanism.
+        duration: Seconds to simulate; may be left out when `times` are given.
+        drives: Per joint name a drive (`Torque`, `PD`, `Locked`, `Free`), or what makes a `Torque`:
+            a number, one number a degree of freedom, or a callable `f(t, q, v)` of the joint's own
+            coordinates and velocities. Joints without a drive move freely.
+        wrenches: Per body name an external `Wrench`.
+        q0: Initial coordinates, shape (nq,); the neutral configuration by default.
+        v0: Initial velocities, shape (nv,); zero by default.
+        every: Interval between samples [s]; a thousandth of the duration by default.
+        times: The sample times instead [s], increasing.
+        tolerance: Local error allowed a step, relative to the size of the state and absolute.
+        integrator: "adams", "bdf", "runge_kutta_4" or "semi_implicit_euler"; the last two take
+            fixed steps of `step` seconds.
+        method: How accelerations are computed: "auto", "constraint_force", "articulated_body" or
+            "composite_rigid_body".
+        solver: Linear solver of the constraint-force method: "auto", "thomas",
+            "conjugate_gradient".
+        initial_guess: Where an iterative solver starts: "zero", "previous", "cubic", ...
+        stop: Stopping test of an iterative solver: "energy_norm" or "relative_change".
+        solver_tolerance: What that test compares with; follows `tolerance` by default.
+        max_iterations: Most iterations of one solution.
+        step: Step of the fixed-step integrators [s].
+        max_step: Longest step of the others [s].
+        threads: Worker threads; the results do not depend on it.
+        quantities: What to record, of "position", "velocity", "acceleration", "joint_load",
+            "drive_torque", "energy", "statistics"; all by default.
+        joints: Names of the joints to record; all by default.
+        output: Path of a Zarr store to write while simulating; in memory when left out. An
+            existing linkwise run there is replaced, anything else is refused.
+        progress: Called with a `Progress` a few times a second.
+        on_failure: "raise" SimulationError (SimulationInterrupted on Ctrl-C), or "return" the run
+            that ended early; its `outcome` says why.
+        scenario_text: Kept in the provenance.
+
+    Raises:
+        InputError: an argument is wrong; nothing was written.
+        SimulationError: the simulation could not go on; `.run` holds the results until then.
+    """
+    sampled = sample_times(duration, every, times)
+    start = (
+        state_vector("q0", q0, model.nq, model.neutral_configuration()),
+        state_vector("v0", v0, model.nv, np.zeros(model.nv)),
+    )
+    schema = build_schema(model, quantities, joints)
+    by_joint, by_body = _check_driven(model, drives, wrenches)
+    if on_failure not in ("raise", "return"):
+        raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
+    if output is not None:
+        check_target(output)
+    options = {
+        "integrator": integrator,
+        "tolerance": number("tolerance", tolerance),
+        "method": method,
+        "solver": solver,
+        "initial_guess": initial_guess,
+        "stop": stop,
+        "solver_tolerance": optional_number("solver_tolerance", solver_tolerance),
+        "max_iterations": optional_count("max_iterations", max_iterations),
+        "step": optional_number("step", step),
+        "max_step": optional_number("max_step", max_step),
+        "threads": optional_count("threads", threads),
+    }
+    simulation = _core.Simulation(model, **options)
+    for joint, drive in by_joint.items():
+        drive.apply(simulation, joint)
+    for body, wrench in by_body.items():
+        wrench.apply(simulation, body)
+    simulation.start(0.0, *start)
+    attrs = provenance(
+        model,
+        options={**options, "duration": float(sampled[-1]), "quantities": schema.quantities},
+        scenario=scenario_text,
+        cpu_target=_core.cpu_target,
+    )
+    attrs |= _chosen(simulation, by_joint, by_body)
+    record = _recorder(schema, attrs, sampled.size, output)
+    run, ending = _record(simulation, record, schema, sampled, progress)
+    if on_failure == "raise":
+        raise_failure(model, ending, run)
+    return run
+
+
+def raise_failure(model: Model, ending: Ending, run: Run) -> None:
+    """Raise what suits a run that did not reach its end."""
+    if ending.outcome == "interrupted":
+        where = f"; the results until then are in {run.path}" if run.path else ""
+        raise SimulationInterrupted(f"{ending.message}{where}", run)
+    if ending.outcome != "converged":
+        raise SimulationError(failure_message(model, ending), run)
+
+
+def run_scenario(
+    scenario: Scenario | str | os.PathLike[str],
+    *,
+    output: str | os.PathLike[str] | None = None,
+    progress: Callable[[Progress], object] | None = None,
+    on_failure: Literal["raise", "return"] = "raise",
+) -> Run:
+    """Simulate a scenario, given as a file or as `load_scenario` returned it.
+
+    `output`, where given, goes before the scenario's own `[output] path`; without either the run
+    stays in memory. See `simulate` for the rest.
+    """
+    from linkwise.io.scenario import Scenario, load_scenario
+
+    loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    model = loaded.load_model()
+    arguments = loaded.simulate_arguments(model)
+    if output is not None:
+        arguments["output"] = output
+    return simulate(model, **arguments, progress=progress, on_failure=on_failure)
