@@ -1,0 +1,1 @@
+"""Machines, random trees, an independent reference and comparisons shared by the tests."""
