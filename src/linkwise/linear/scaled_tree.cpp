@@ -85,7 +85,8 @@ void ScaledTree::set_structure(const BlockTree& A) {
 }
 
 bool ScaledTree::prepare(const BlockTree& A) {
-  if (!same_structure(A)) set_structure(A);
+  structure_changed_ = !same_structure(A);
+  if (structure_changed_) set_structure(A);
   const int count = n();
   for (int i = 0; i < count; ++i) {
     failed_node_ = i;
@@ -129,7 +130,7 @@ bool ScaledTree::scale_hub(const BlockTree& A, int h) {
 void ScaledTree::scale_right_hand_side(std::span<const double> b, std::span<double> scaled) const {
   for (int i = 0; i < n(); ++i)
     with_dim(dim[i], [&](auto d) {
-      double local[6];
+      double local[6] = {};
       std::copy(b.data() + offset[i], b.data() + offset[i] + d.n, local);
       ldlt_forward<d.n>(lower_[i].data(), local);
       for (int k = 0; k < d.n; ++k) scaled[offset[i] + k] = local[k] * roots_[i][k];

@@ -26,6 +26,8 @@ class ScaledTree {
   /// failed_node() tells where.
   bool prepare(const BlockTree& A);
   int failed_node() const { return failed_node_; }
+  /// Did the last prepare() meet another structure than the one before?
+  bool structure_changed() const { return structure_changed_; }
 
   int n() const { return static_cast<int>(parent.size()); }
   int size() const { return offset.empty() ? 0 : offset.back(); }
@@ -71,6 +73,7 @@ class ScaledTree {
   std::vector<PackedLower> lower_;            ///< unit L; the diagonal holds 1 / D
   std::vector<std::array<double, 6>> roots_;  ///< sqrt(1 / D)
   int failed_node_ = -1;
+  bool structure_changed_ = false;
 };
 
 }  // namespace linkwise

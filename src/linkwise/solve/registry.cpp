@@ -1,21 +1,52 @@
 #include "linkwise/solve/registry.hpp"
 
-#include <array>
 #include <string>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/solve/direct/thomas.hpp"
+#include "linkwise/solve/iterative/block_schwarz_conjugate_gradient.hpp"
+#include "linkwise/solve/iterative/chebyshev.hpp"
 #include "linkwise/solve/iterative/conjugate_gradient.hpp"
+#include "linkwise/solve/iterative/gauss_seidel.hpp"
+#include "linkwise/solve/iterative/jacobi.hpp"
+#include "linkwise/solve/iterative/lagged_thomas.hpp"
+#include "linkwise/solve/iterative/red_black_gauss_seidel.hpp"
+#include "linkwise/solve/iterative/red_black_sor.hpp"
+#include "linkwise/solve/iterative/rs_conjugate_gradient.hpp"
+#include "linkwise/solve/iterative/sor.hpp"
+#include "linkwise/solve/iterative/symmetric_stair_conjugate_gradient.hpp"
 
 namespace linkwise {
 namespace {
 
-constexpr std::array<SolverEntry, 2> table{{
-    {"thomas", "block elimination, leaf to root; hubs in linear time", SolverKind::direct, false,
-     "golub2013", make_thomas},
-    {"conjugate_gradient", "conjugate gradients with the block diagonal as preconditioner (J-CG)",
-     SolverKind::iterative, true, "sharf1993", make_conjugate_gradient},
-}};
+using enum SolverKind;
+
+constexpr SolverEntry table[] = {
+    {"thomas", "block elimination, leaf to root, hubs in linear time", direct, false, "golub2013",
+     make_thomas},
+    {"conjugate_gradient", "conjugate gradients, preconditioned by the block diagonal (J-CG)",
+     iterative, true, "sharf1993", make_conjugate_gradient},
+    {"jacobi", "block Jacobi", iterative, true, "sharf1993", make_jacobi},
+    {"gauss_seidel", "block Gauss-Seidel, base to tip", iterative, false, "sharf1993",
+     make_gauss_seidel},
+    {"sor", "block successive over-relaxation, base to tip", iterative, false, "sharf1993",
+     make_sor},
+    {"chebyshev", "Chebyshev acceleration of block Jacobi (J-SI)", iterative, true, "sharf1993",
+     make_chebyshev},
+    {"red_black_gauss_seidel", "block Gauss-Seidel, every second node at once", iterative, true,
+     "hageman1981", make_red_black_gauss_seidel},
+    {"red_black_sor", "block successive over-relaxation, every second node at once", iterative,
+     true, "hageman1981", make_red_black_sor},
+    {"rs_conjugate_gradient", "conjugate gradients with every second node eliminated (RS-CG)",
+     iterative, true, "hageman1981", make_rs_conjugate_gradient},
+    {"symmetric_stair_conjugate_gradient", "conjugate gradients, symmetric stair preconditioner",
+     iterative, true, "bu2024", make_symmetric_stair_conjugate_gradient},
+    {"block_schwarz_conjugate_gradient",
+     "conjugate gradients, exact solves on pieces of block_size joints", iterative, true,
+     "smith1996", make_block_schwarz_conjugate_gradient},
+    {"lagged_thomas", "conjugate gradients, preconditioned by the factor of an earlier system",
+     iterative, false, "golub2013", make_lagged_thomas},
+};
 
 }  // namespace
 

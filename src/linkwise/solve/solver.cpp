@@ -13,6 +13,36 @@ namespace {
 template <class Enum, std::size_t count>
 using NameTable = std::array<std::pair<Enum, std::string_view>, count>;
 
+struct OutcomeText {
+  Outcome outcome;
+  std::string_view name, message, remedy;
+};
+
+constexpr OutcomeText outcomes[] = {
+    {Outcome::converged, "converged", "the solution meets the tolerance", ""},
+    {Outcome::reached_max_iterations, "reached_max_iterations",
+     "the iteration limit was reached before the tolerance was met",
+     "use solver 'thomas' or 'two_level', allow more iterations, or loosen the tolerance"},
+    {Outcome::not_positive_definite, "not_positive_definite", "the matrix is not positive definite",
+     "check the inertias: each must be positive definite, and no two joints may constrain the same "
+     "direction of the same two bodies"},
+    {Outcome::not_finite, "not_finite", "a number in the system or in the iteration is not finite",
+     "check masses, inertias, drives and the state for values that are infinite or far too large"},
+    {Outcome::stagnated, "stagnated",
+     "rounding errors keep the iteration from meeting the tolerance",
+     "loosen the tolerance, or use the articulated_body method, which loses no digits on long "
+     "straight chains"},
+    {Outcome::diverged, "diverged", "the iteration diverges: its spectral radius is above 1",
+     "use a solver that converges for every mechanism: 'conjugate_gradient', 'gauss_seidel' or "
+     "'thomas'"},
+};
+
+const OutcomeText& find(Outcome outcome) {
+  for (const OutcomeText& text : outcomes)
+    if (text.outcome == outcome) return text;
+  return outcomes[0];
+}
+
 constexpr NameTable<StopRule, 3> stop_rules{{{StopRule::paper, "paper"},
                                              {StopRule::residual, "residual"},
                                              {StopRule::energy_norm, "energy_norm"}}};
@@ -49,57 +79,9 @@ std::string number(double value) {
 
 }  // namespace
 
-std::string_view to_string(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::converged:
-      return "converged";
-    case Outcome::reached_max_iterations:
-      return "reached_max_iterations";
-    case Outcome::not_positive_definite:
-      return "not_positive_definite";
-    case Outcome::not_finite:
-      return "not_finite";
-    case Outcome::stagnated:
-      return "stagnated";
-  }
-  return "?";
-}
-
-std::string_view message(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::converged:
-      return "the solution meets the tolerance";
-    case Outcome::reached_max_iterations:
-      return "the iteration limit was reached before the tolerance was met";
-    case Outcome::not_positive_definite:
-      return "the matrix is not positive definite";
-    case Outcome::not_finite:
-      return "a number in the system or in the iteration is not finite";
-    case Outcome::stagnated:
-      return "rounding errors keep the iteration from meeting the tolerance";
-  }
-  return "?";
-}
-
-std::string_view remedy(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::converged:
-      return "";
-    case Outcome::reached_max_iterations:
-      return "use solver 'thomas' or 'two_level', allow more iterations, or loosen the tolerance";
-    case Outcome::not_positive_definite:
-      return "check the inertias: each must be positive definite, and joints must not constrain "
-             "the "
-             "same direction twice";
-    case Outcome::not_finite:
-      return "check masses, inertias, drives and the state for values that are not finite or far "
-             "too large";
-    case Outcome::stagnated:
-      return "loosen the tolerance, use solver 'thomas' with refinement, or use the "
-             "articulated_body method, which loses no digits on long straight chains";
-  }
-  return "";
-}
+std::string_view to_string(Outcome outcome) { return find(outcome).name; }
+std::string_view message(Outcome outcome) { return find(outcome).message; }
+std::string_view remedy(Outcome outcome) { return find(outcome).remedy; }
 
 std::string_view to_string(StopRule rule) { return to_name(stop_rules, rule); }
 StopRule stop_rule_from_name(std::string_view name) {

@@ -17,6 +17,7 @@ enum class Outcome {
   not_positive_definite,
   not_finite,
   stagnated,
+  diverged,
 };
 
 std::string_view to_string(Outcome outcome);

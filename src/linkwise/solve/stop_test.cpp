@@ -45,14 +45,18 @@ double StopTest::energy_bound() const {
 }
 
 double StopTest::relative_error() const {
+  // Nothing is known beyond rounding.
   const double error = std::sqrt(std::max(0.0, squared_error_));
-  return solution_energy_ > 0.0 ? error / std::sqrt(solution_energy_) : error;
+  return solution_energy_ > 0.0
+             ? std::max(error / std::sqrt(solution_energy_), std::numeric_limits<double>::epsilon())
+             : error;
 }
 
 // The extrapolated tail of the decreases errs on the low side when convergence pauses, the bound on
 // the high side by up to the condition number. Measured on rigid chains of every kind, the larger
 // of the tail and a quarter (in the norm) of the bound is right to a factor of about four.
 double StopTest::calc_squared_error(const IterationStep& step) const {
+  if (step.squared_error >= 0.0) return step.squared_error;
   const double share = correcting_ ? 1.0 : 1.0 / 16.0;
   return std::max(estimate_.squared_error(), share * step.squared_bound);
 }
@@ -96,6 +100,7 @@ bool StopTest::at_rounding_level(const IterationStep& step) const {
 bool StopTest::stops(const IterationStep& step) {
   ++iterations_;
   estimate_.add(step.decrease);
+  if (estimate_.count() == 1) first_decrease_ = std::abs(step.decrease);
   if (!correcting_) solution_energy_ = step.solution_energy;
   if (!std::isfinite(step.decrease) || !std::isfinite(step.solution_energy))
     outcome_ = Outcome::not_finite;
@@ -103,6 +108,8 @@ bool StopTest::stops(const IterationStep& step) {
     outcome_ = Outcome::converged;
   else if (at_rounding_level(step))
     outcome_ = Outcome::stagnated;
+  else if (std::abs(step.decrease) > 1e20 * first_decrease_)
+    outcome_ = Outcome::diverged;
   else if (iterations_ >= max_iterations_)
     outcome_ = Outcome::reached_max_iterations;
   else

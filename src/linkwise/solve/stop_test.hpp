@@ -16,6 +16,8 @@ struct IterationStep {
   /// Upper bound of ||e||_A^2 where the method has one, else 0. Conjugate gradients have it from
   /// the smallest Ritz value; it holds once that has converged.
   double squared_bound = 0.0;
+  /// The method's own estimate of ||e||_A^2, or a negative number for the stop test's.
+  double squared_error = -1.0;
   std::span<const double> x;
   std::span<const double> change;  ///< x+ - x, up to `factor`
   double factor = 1.0;
@@ -65,7 +67,7 @@ class StopTest {
   EnergyEstimate estimate_;
   const ScaledTree* scaling_ = nullptr;
   StopRule rule_ = StopRule::energy_norm;
-  double squared_error_ = 0.0;
+  double squared_error_ = 0.0, first_decrease_ = 0.0;
   double tolerance_ = 0.0, absolute_tolerance_ = 0.0;
   double right_hand_side_norm_ = 0.0;
   double solution_energy_ = 0.0;

@@ -45,6 +45,7 @@ LW_INLINE void add_congruence(const double* b, const double* change, double* s) 
 void TreeFactor::set_structure(const BlockTree& A, std::span<const char> cut) {
   const int n = A.n();
   parent_.assign(A.parent.begin(), A.parent.end());
+  tree_parent_.assign(A.parent.begin(), A.parent.end());
   dim_.assign(A.dim.begin(), A.dim.end());
   offset_.assign(A.offset.begin(), A.offset.end());
   hub_.assign(A.hub.begin(), A.hub.end());

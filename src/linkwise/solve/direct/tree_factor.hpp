@@ -23,6 +23,8 @@ class TreeFactor {
   /// The node at which factor() failed, or -1.
   int failed_node() const { return failed_node_; }
   bool empty() const { return dim_.empty(); }
+  /// Was the last factor made for a tree of this structure, whatever its numbers?
+  bool fits(const BlockTree& A) const { return dim_ == A.dim && tree_parent_ == A.parent; }
   /// Forgets the factor, keeps the memory.
   void clear() { dim_.clear(); }
 
@@ -44,6 +46,7 @@ class TreeFactor {
   void sweep_tip_to_base(double* x);
   void sweep_base_to_tip(double* x);
 
+  std::vector<int> tree_parent_;  ///< as given, without cuts
   std::vector<int> parent_, dim_, offset_, hub_, lever_;
   std::vector<char> loaded_;  ///< does the pivot block hold its node's diagonal already?
   std::vector<Node> nodes_;

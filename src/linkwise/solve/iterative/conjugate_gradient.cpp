@@ -77,7 +77,13 @@ void ConjugateGradient::three_term(std::span<const double> b, std::span<double> 
     zz = sum_of_squares(z);
     share /= share + zz / zz_previous;
     const double bound = zz * share / stop.smallest_eigenvalue();
-    if (stop.stops({decrease, energy, bound, x, change_, 1.0, z})) return;
+    if (stop.stops({.decrease = decrease,
+                    .solution_energy = energy,
+                    .squared_bound = bound,
+                    .x = x,
+                    .change = change_,
+                    .residual = z}))
+      return;
     gamma_previous = gamma;
   }
 }

@@ -1,0 +1,11 @@
+#pragma once
+
+#include <memory>
+
+#include "linkwise/solve/solver.hpp"
+
+namespace linkwise {
+
+std::unique_ptr<LinearSolver> make_two_level(const SolverOptions& options);
+
+}  // namespace linkwise
