@@ -1,5 +1,5 @@
 #pragma once
-// Articulated-body recursion [featherstone-1983, featherstone-2008 ch. 7] for trees and every
+// Articulated-body recursion [featherstone1983; featherstone2008, ch. 7] for trees and every
 // joint:
 //     Y_n = M_n + sum X_k^T Ya_k X_k,  U = Y P,  D = P^T U + armature,  u = tau - P^T p
 //     Ya = Y - U D^-1 U^T,  pa = p + Ya c + U D^-1 u;   du = D^-1 (u - U^T (X a_p + c))

@@ -1,5 +1,5 @@
 #pragma once
-// Newton-Euler recursion [luh1980; featherstone-2008 ch. 5]: accelerations outward, wrenches
+// Newton-Euler recursion [luh1980; featherstone2008, ch. 5]: accelerations outward, wrenches
 // inward,
 //     a_n = X_n a_p + P du + c,  w_n = M_n a_n + p_n + sum X_k^T w_k,  tau = P^T w + armature du.
 // w_n is the joint load, so this is also the witness for the loads of every other method.

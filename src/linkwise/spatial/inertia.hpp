@@ -1,5 +1,5 @@
 #pragma once
-// Rigid-body and articulated-body inertias in packed form [featherstone-2008, ch. 2 and 7].
+// Rigid-body and articulated-body inertias in packed form [featherstone2008, ch. 2 and 7].
 #include "linkwise/spatial/motion.hpp"
 
 namespace linkwise {

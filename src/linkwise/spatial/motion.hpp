@@ -1,6 +1,6 @@
 #pragma once
 // Spatial motion and force vectors, linear part first, and the transform between two frames
-// [featherstone-2008, with the order of the parts as in NOTATION.md].
+// [featherstone2008, with the order of the parts as in NOTATION.md].
 #include "linkwise/spatial/vec3.hpp"
 
 namespace linkwise {

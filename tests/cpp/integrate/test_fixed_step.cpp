@@ -71,7 +71,7 @@ TEST(SemiImplicitEuler, HasOrderOneAtAndBetweenSteps) {
 }
 
 TEST(SemiImplicitEuler, ConservesTheModifiedEnergyOfAnOscillator) {
-  // Of q'' = -q, semi-implicit Euler conserves q^2 + v^2 - h q v exactly [Hairer2006, I.2].
+  // Of q'' = -q, semi-implicit Euler conserves q^2 + v^2 - h q v exactly [hairer2006, I.2].
   struct Oscillator : ForcedOscillator {
     bool evaluate(double, const double* y, double* ydot) override {
       ydot[0] = y[1];

@@ -1,4 +1,4 @@
-/// The classical Runge-Kutta method of order 4 [Kutta1901]:
+/// The classical Runge-Kutta method of order 4 [kutta1901]:
 ///   k1 = f(t, y), k2 = f(t + h/2, y + h/2 k1), k3 = f(t + h/2, y + h/2 k2), k4 = f(t + h, y + h
 ///   k3), y(t + h) = y + h/6 (k1 + 2 k2 + 2 k3 + k4).
 /// Between steps it is the cubic Hermite polynomial through both ends and their derivatives, whose

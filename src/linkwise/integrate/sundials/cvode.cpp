@@ -1,4 +1,4 @@
-/// CVODE's variable-order, variable-step multistep methods [Hindmarsh2005]: Adams-Moulton with
+/// CVODE's variable-order, variable-step multistep methods [hindmarsh2005]: Adams-Moulton with
 /// functional iteration, and backward differentiation with Newton iteration. The error test bounds
 /// the root mean square of e_i / (rtol |y_i| + atol) by 1 in every step. Output is read off the
 /// method's own interpolating polynomial, so the steps do not depend on the output times.

@@ -14,7 +14,7 @@ namespace linkwise {
 
 /// Estimate of the smallest eigenvalue of the preconditioned matrix from the coefficients of
 /// conjugate gradients, by incremental condition estimation [bischof1990] of the bidiagonal
-/// Cholesky factor of the Lanczos matrix: a dozen operations an iteration, as in [meurant2018].
+/// Cholesky factor of the Lanczos matrix: a dozen operations an iteration, as in [meurant2019].
 class SmallestRitz {
  public:
   /// step: alpha_k of this iteration; growth: beta of the previous one.
