@@ -7,10 +7,13 @@ import signal
 import threading
 import time as clock
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
 
 if TYPE_CHECKING:
     from linkwise._core import Simulation
@@ -20,6 +23,8 @@ if TYPE_CHECKING:
 # display and for Ctrl-C, long enough that the calls themselves cost nothing.
 CALL_SECONDS = 0.2
 CALL_BYTES = 32 << 20
+# An interval between samples that takes long is itself cut, into this many pieces at most.
+MOST_PIECES = 1024
 COUNTERS = ("steps", "evaluations", "iterations")
 
 
@@ -77,7 +82,8 @@ class _Interrupt:
             signal.signal(signal.SIGINT, self._previous)
 
     def _handle(self, *_: object) -> None:
-        # A call that takes long already may take much longer: give up its samples.
+        # A call that takes long already may take much longer: give up its samples. Python runs this
+        # between calls into the core, and in one when a drive is a Python function.
         long_call = clock.monotonic() - self._call_started > 5 * CALL_SECONDS
         if self.pressed or long_call:
             raise KeyboardInterrupt
@@ -92,42 +98,67 @@ class _Interrupt:
             self._call_started = float("inf")
 
 
-def _next_count(count: int, spent: float, most: int) -> int:
-    """Samples for the next call, from how long the last one took."""
-    if spent < CALL_SECONDS / 2:
-        return min(2 * count, most)
-    return max(1, count // 2) if spent > 2 * CALL_SECONDS else count
+@dataclass
+class _Pace:
+    """How much one call computes: several samples, or one of the pieces of a single interval.
+
+    How times are cut into calls depends on the clock; the results do not, because the integrators
+    choose their steps by themselves and everything else is read from their dense output.
+    """
+
+    most: int
+    count: int = 1
+    pieces: int = 1
+
+    def adapt(self, spent: float) -> None:
+        if spent < CALL_SECONDS / 2:
+            if self.pieces > 1:
+                self.pieces //= 2
+            else:
+                self.count = min(2 * self.count, self.most)
+        elif spent > 2 * CALL_SECONDS:
+            if self.count > 1:
+                self.count //= 2
+            else:
+                self.pieces = min(2 * self.pieces, MOST_PIECES)
+
+    def calls(self, times: Array) -> Iterator[tuple[Array, bool]]:
+        """The times of each call, and whether they are samples or lie between two of them."""
+        done, previous = 0, 0.0
+        while done < times.size:
+            between = np.linspace(previous, times[done], self.pieces + 1)[1:-1]
+            for time in between:
+                yield np.array([time]), False
+            wanted = times[done : done + self.count]
+            yield wanted, True
+            done += wanted.size
+            previous = float(wanted[-1])
 
 
 def run_time_loop(
     simulation: Simulation,
     recorder: Recorder,
     schema: Schema,
-    times: npt.NDArray[np.float64],
+    times: Array,
     progress: Callable[[Progress], object] | None = None,
 ) -> Ending:
-    """Advance through the sample times, handing each chunk to the recorder.
-
-    How the times are cut into calls depends on the clock; the results do not, because the
-    integrator's steps are its own and samples come from its dense output.
-    """
-    wanted = set(schema.quantities)
-    most = max(1, CALL_BYTES // schema.row_bytes)
+    """Advance through the sample times, handing each chunk of samples to the recorder."""
+    pace = _Pace(most=max(1, CALL_BYTES // schema.row_bytes))
     end = float(times[-1])
     started = clock.monotonic()
     counters = dict.fromkeys(COUNTERS, 0)
-    done, count, reached = 0, 1, 0.0
+    reached, recorded = 0.0, 0
     with _Interrupt() as interrupt:
         try:
-            while done < times.size and not interrupt.pressed:
+            for asked, are_samples in pace.calls(times):
                 before = clock.monotonic()
                 with interrupt.call():
-                    chunk = simulation.advance(times[done : done + count], wanted)
-                count = _next_count(count, clock.monotonic() - before, most)
-                recorder.append(chunk)
-                rows = len(chunk["time"])
-                done += rows
-                if rows:
+                    chunk = simulation.advance(asked, schema.quantities if are_samples else ())
+                pace.adapt(clock.monotonic() - before)
+                if are_samples:
+                    recorder.append(chunk)
+                    recorded += len(chunk["time"])
+                if len(chunk["time"]):
                     reached = float(chunk["time"][-1])
                     counters = {name: int(np.ravel(chunk[name])[-1]) for name in COUNTERS}
                 if chunk["outcome"] != "converged":
@@ -142,8 +173,10 @@ def run_time_loop(
                     wall = clock.monotonic() - started
                     steps, evaluations = counters["steps"], counters["evaluations"]
                     progress(Progress(reached, end, wall, steps, evaluations))
+                if interrupt.pressed:
+                    break
         except KeyboardInterrupt:
             pass
-    if done < times.size:
+    if recorded < times.size:
         return Ending("interrupted", reached, "", f"interrupted at t = {reached:g} s", counters)
     return Ending("converged", reached, "", "", counters)

@@ -7,6 +7,7 @@ velocities `base.vx` ... `base.wz`. The order is the one of the compiled core.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -84,12 +85,15 @@ def _axis_scalars(axes: Sequence[tuple[str, object]]) -> tuple[_Scalar, ...]:
     return tuple(_Scalar(str(k + 1), unit) for k, unit in enumerate(units))
 
 
-def _rows(joint: str, where: slice, scalars: Sequence[_Scalar]) -> list[tuple[str, str, int]]:
-    indices = range(where.start, where.stop)
+def _rows(joint: str, first: int, scalars: Sequence[_Scalar]) -> list[tuple[str, str, int]]:
     return [
-        (f"{joint}.{scalar.suffix}" if scalar.suffix else joint, scalar.unit, index)
-        for scalar, index in zip(scalars, indices, strict=True)
+        (f"{joint}.{scalar.suffix}" if scalar.suffix else joint, scalar.unit, first + k)
+        for k, scalar in enumerate(scalars)
     ]
+
+
+def _starts(counts: Sequence[int]) -> list[int]:
+    return [0, *itertools.accumulate(counts)]
 
 
 def _collect(rows: list[tuple[str, str, int]]) -> Scalars:
@@ -101,6 +105,7 @@ def joint_scalars(model: Model, joints: Sequence[int]) -> tuple[Scalars, Scalars
     """Coordinates and velocities of the joints given by index, in that order."""
     names, types = model.joint_names, model.joint_types
     axes = model.joint_axes if "composite" in types else []
+    q_first, v_first = _starts(model.joint_nq), _starts(model.joint_nv)
     positions: list[tuple[str, str, int]] = []
     velocities: list[tuple[str, str, int]] = []
     for joint in joints:
@@ -109,6 +114,6 @@ def joint_scalars(model: Model, joints: Sequence[int]) -> tuple[Scalars, Scalars
             q_scalars = v_scalars = _axis_scalars(axes[joint])
         else:
             q_scalars, v_scalars = _SCALARS[types[joint]]
-        positions += _rows(name, model.q_slice(name), q_scalars)
-        velocities += _rows(name, model.v_slice(name), v_scalars)
+        positions += _rows(name, q_first[joint], q_scalars)
+        velocities += _rows(name, v_first[joint], v_scalars)
     return _collect(positions), _collect(velocities)

@@ -181,14 +181,10 @@ def _statistics() -> list[Variable]:
     ]
 
 
-def build_schema(
-    model: Model,
-    quantities: Collection[str] | None = None,
-    joints: Sequence[str] | None = None,
-) -> Schema:
-    """Describe a run of `model` that keeps these quantities of these joints."""
-    kept = resolve_quantities(quantities)
-    selected = resolve_joints(model, joints)
+def _joint_variables(
+    model: Model, kept: Sequence[str], selected: Sequence[int]
+) -> tuple[list[Variable], dict[str, Coordinate]]:
+    """What is recorded per joint, coordinate or degree of freedom, with its labels."""
     positions, velocities = joint_scalars(model, selected)
     joint_names, body_names = model.joint_names, model.body_names  # lists made on every access
     names = text_array(joint_names[k] for k in selected)
@@ -220,6 +216,21 @@ def build_schema(
         bodies = text_array(body_names[k] for k in selected)
         about = {"long_name": "outboard body of the joint"}
         coordinates["body"] = Coordinate(("joint",), bodies, about)
+    return variables, coordinates
+
+
+def build_schema(
+    model: Model,
+    quantities: Collection[str] | None = None,
+    joints: Sequence[str] | None = None,
+) -> Schema:
+    """Describe a run of `model` that keeps these quantities of these joints."""
+    kept = resolve_quantities(quantities)
+    selected = resolve_joints(model, joints)
+    variables: list[Variable] = []
+    coordinates: dict[str, Coordinate] = {}
+    if not set(kept) <= {"energy", "statistics"}:  # labels of a million joints take seconds
+        variables, coordinates = _joint_variables(model, kept, selected)
     if "energy" in kept:
         real = np.dtype(np.float64)
         variables += [Variable(name, (), (), real, attrs) for name, attrs in _ENERGY_ATTRS.items()]

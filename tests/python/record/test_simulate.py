@@ -84,14 +84,40 @@ def test_subsets_are_the_same_numbers(chain):
         xr.testing.assert_equal(part[name], whole[name].sel(joint=kept))
 
 
+def pace(monkeypatch, count, pieces=1):
+    """Fix how many samples a call computes, or in how many pieces an interval is."""
+
+    def adapt(self, spent):
+        self.count, self.pieces = count, pieces
+
+    monkeypatch.setattr(time_loop._Pace, "adapt", adapt)
+
+
+def test_pace_follows_the_clock():
+    pace = time_loop._Pace(most=8)
+    for _ in range(5):
+        pace.adapt(0.0)
+    assert (pace.count, pace.pieces) == (8, 1)
+    for _ in range(5):
+        pace.adapt(1.0)
+    assert (pace.count, pace.pieces) == (1, 4)
+    calls = list(pace.calls(np.array([0.0, 1.0])))
+    between = [float(times[0]) for times, are_samples in calls if not are_samples]
+    assert between == [0, 0, 0, 0.25, 0.5, 0.75]
+    assert [float(times[0]) for times, are_samples in calls if are_samples] == [0, 1]
+    for _ in range(5):
+        pace.adapt(0.0)
+    assert (pace.count, pace.pieces) == (8, 1)
+
+
 @pytest.mark.parametrize("integrator", ["adams", "bdf", "runge_kutta_4", "semi_implicit_euler"])
 def test_results_do_not_depend_on_how_the_loop_is_cut(chain, monkeypatch, integrator):
     options = {"duration": 1.0, "every": 0.013, "q0": bend(chain), "integrator": integrator}
     if integrator not in ("adams", "bdf"):
         options["step"] = 1e-3
     runs = []
-    for pieces in (1, 7, 1000):
-        monkeypatch.setattr(time_loop, "_next_count", lambda *_, n=pieces: n)
+    for count, pieces in ((1, 1), (7, 1), (1000, 1), (1, 5)):
+        pace(monkeypatch, count, pieces)
         runs.append(lw.simulate(chain, **options))
     for run in runs[1:]:
         xr.testing.assert_equal(run.dataset, runs[0].dataset)
@@ -272,7 +298,7 @@ def interrupt_at(time):
 
 @pytest.mark.parametrize("output", [None, "run.zarr"])
 def test_interrupt_keeps_the_samples(chain, tmp_path, monkeypatch, output):
-    monkeypatch.setattr(time_loop, "_next_count", lambda *_: 5)
+    pace(monkeypatch, 5)
     options = {"duration": 1.0, "every": 0.01, "progress": interrupt_at(0.5)}
     output = output and tmp_path / output
     with pytest.raises(KeyboardInterrupt) as caught:
