@@ -1,0 +1,61 @@
+"""One-line complaints about bad input: file, line, element, what is wrong, what to do.
+
+Names and numbers in a message come from files that nobody vouches for, so they are shortened and
+stripped of control characters: a complaint stays one line whatever the file holds.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterable
+from typing import NoReturn
+
+from linkwise._core import InputError
+
+_SHOWN_NAMES = 8
+_SHOWN_CHARACTERS = 60
+
+
+def shorten(text: object, limit: int = _SHOWN_CHARACTERS) -> str:
+    """``text`` on one line, printable, at most ``limit`` characters."""
+    line = "".join(c if c.isprintable() else " " for c in str(text)[: 4 * limit])
+    line = " ".join(line.split())
+    return line if len(line) <= limit else line[: limit - 3] + "..."
+
+
+def near(name: str, known: Iterable[str], kind: str = "known") -> str:
+    """``did you mean 'elbow'?`` for the nearest known name, otherwise a list of some of them."""
+    names = list(known)
+    if not names:
+        return "there are none"
+    if len(name) <= 200:
+        matches = difflib.get_close_matches(name, names[:5000], n=1, cutoff=0.6)
+        if matches:
+            return f"did you mean '{shorten(matches[0])}'?"
+    listed = ", ".join(shorten(n) for n in names[:_SHOWN_NAMES])
+    return f"{kind}: {listed}" + (", ..." if len(names) > _SHOWN_NAMES else "")
+
+
+def complaint(
+    source: str | os.PathLike[str],
+    element: str,
+    problem: str,
+    remedy: str,
+    line: int | None = None,
+) -> InputError:
+    """The error ``FILE:LINE: ELEMENT: PROBLEM; REMEDY``, ready to raise."""
+    where = shorten(os.fspath(source), 400) + (f":{line}" if line else "")
+    parts = [p for p in (where, element) if p]
+    return InputError(f"{': '.join(parts)}: {problem}; {remedy}")
+
+
+def complain(
+    source: str | os.PathLike[str],
+    element: str,
+    problem: str,
+    remedy: str,
+    line: int | None = None,
+) -> NoReturn:
+    """Raise :func:`complaint`."""
+    raise complaint(source, element, problem, remedy, line)

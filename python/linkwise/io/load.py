@@ -1,0 +1,116 @@
+"""Loading a model file: the format is told from the file's root element."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise._core import Model
+from linkwise.io.complaint import complain, shorten
+from linkwise.io.urdf import Mimic, read_urdf
+from linkwise.io.urdf_tree import JointOrder
+from linkwise.io.xml import local_name, parse_xml
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+_HINTS = {
+    ".toml": "a scenario: run it with 'linkwise run' or read it with linkwise.load_scenario",
+    ".xacro": "a xacro file: expand it first with 'xacro FILE.xacro > FILE.urdf'",
+    ".csv": "a table: name it in a drive",
+    ".zarr": "a result: open it with linkwise.open_run",
+}
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    floating_base: bool = False,
+    gravity: npt.ArrayLike | None = None,
+    package_dirs: Sequence[str | os.PathLike[str]] = (),
+    joint_order: JointOrder = "file",
+    keep_fixed: bool = False,
+    mimic: Mimic = "independent",
+) -> Model:
+    """Read a URDF or MJCF file into a Model.
+
+    path: the file; its root element, not its suffix, tells the format.
+    floating_base: give the root link of a URDF six degrees of freedom instead of welding it to the
+        ground (an MJCF says this itself, with a free joint).
+    gravity: m/s2 in the world frame; by default (0, 0, -9.81) for a URDF and the file's own for an
+        MJCF.
+    package_dirs: directories in which packages of ``package://`` paths may lie; only existence is
+        checked, the dynamics needs no meshes.
+    joint_order: "file" keeps the file's order (parents first), "pinocchio" goes depth first with
+        the joints of one link by name, so that q, v and tau can be handed over as they are.
+    keep_fixed: keep links on fixed joints as bodies of their own instead of merging them.
+    mimic: what a URDF's mimic joints become: "independent" joints with a warning note, or "error".
+
+    Raises InputError, in one line that names file, line, element and remedy, for anything that
+    cannot be read without guessing. What was ignored or assumed is in ``model.notes``.
+    The file may come from anywhere: nothing in it can reach the network or run code.
+    """
+    _check_choice(path, "joint_order", joint_order, get_args(JointOrder))
+    _check_choice(path, "mimic", mimic, get_args(Mimic))
+    for directory in package_dirs:
+        if not Path(directory).is_dir():
+            complain(
+                path,
+                "package_dirs",
+                f"'{shorten(os.fspath(directory), 200)}' is not a directory",
+                "give directories that hold the packages",
+            )
+    vector = None if gravity is None else _gravity(path, gravity)
+    suffix = Path(path).suffix.lower()
+    if suffix in _HINTS:
+        complain(path, "model file", "is not a model", f"it looks like {_HINTS[suffix]}")
+    root = parse_xml(path)
+    kind = local_name(root)
+    if kind == "robot":
+        return read_urdf(
+            path,
+            root,
+            gravity=vector or STANDARD_GRAVITY,
+            floating_base=floating_base,
+            joint_order=joint_order,
+            keep_fixed=keep_fixed,
+            mimic=mimic,
+        )
+    if kind == "mujoco":
+        from linkwise.io.mjcf import read_mjcf
+
+        if floating_base:
+            complain(
+                path,
+                "floating_base",
+                "an MJCF file says itself which bodies float",
+                "leave it out, and give the root body a <freejoint/>",
+            )
+        return read_mjcf(path, gravity=vector, keep_fixed=keep_fixed)
+    complain(
+        path,
+        f"element '{shorten(kind)}'",
+        "is the root of neither a URDF nor an MJCF",
+        "give a file whose root element is <robot> or <mujoco>",
+        root.sourceline,
+    )
+
+
+def _check_choice(
+    path: str | os.PathLike[str], name: str, value: str, choices: Sequence[str]
+) -> None:
+    if value not in choices:
+        complain(path, name, f"unknown value '{shorten(value)}'", f"use {' or '.join(choices)}")
+
+
+def _gravity(path: str | os.PathLike[str], gravity: npt.ArrayLike) -> tuple[float, float, float]:
+    try:
+        vector = np.asarray(gravity, dtype=float)
+    except (TypeError, ValueError):
+        vector = np.empty(0)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        complain(path, "gravity", "is not a vector of 3 finite numbers", "give (0, 0, -9.81)")
+    return (float(vector[0]), float(vector[1]), float(vector[2]))

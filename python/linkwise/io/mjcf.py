@@ -1,0 +1,263 @@
+"""Reading MJCF into a Model: MuJoCo's own compiler reads the file, its bodies and joints are taken.
+
+Every body keeps the axes of its MJCF body frame; its link frame lies at the anchor of its last
+joint (MuJoCo's ``pos`` of a joint), because a joint load is given at the joint point. Several
+joints on one body become a stack through links without mass. A hinge or slide counts from the
+pose drawn in the file; a free joint's position is the body's pose in the world, as in MuJoCo, so it
+is zero at the world's origin. :mod:`linkwise.io.mjcf_state` converts qpos and qvel.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise._core import InputError, Model, ModelBuilder
+from linkwise.io.complaint import complain, shorten
+
+Array = npt.NDArray[np.float64]
+KINDS = ("floating", "spherical", "prismatic", "revolute")
+"""Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
+
+
+def read_mjcf(
+    path: str | os.PathLike[str],
+    *,
+    gravity: tuple[float, float, float] | None = None,
+    keep_fixed: bool = False,
+) -> Model:
+    """The model that an MJCF file describes.
+
+    gravity: m/s2; None takes the file's. Raises InputError with MuJoCo's own words for what its
+    compiler refuses, and when the optional package mujoco is missing. Contacts, tendons, equality
+    constraints, actuators and what else is not taken over are warnings in ``model.notes``.
+    """
+    mj_model = compile_mjcf(path)
+    names = Names(mj_model)
+    if gravity is None:
+        gravity = tuple(mj_model.opt.gravity) if _enabled(mj_model, "GRAVITY") else (0, 0, 0)
+    stem = os.path.splitext(os.path.basename(os.fspath(path)))[0]
+    builder = ModelBuilder(stem, gravity=gravity, source=os.fspath(path))
+    try:
+        _add_bodies(builder, mj_model, names)
+        for level, element, text in [*_ignored(mj_model), *_joint_notes(mj_model, names)]:
+            builder.add_note(level, element, text)
+        return builder.build(keep_fixed=keep_fixed)
+    except InputError as error:
+        raise InputError(f"{shorten(os.fspath(path), 400)}: {error}") from None
+
+
+def compile_mjcf(path: str | os.PathLike[str]) -> Any:
+    """The mujoco.MjModel of a file. Raises InputError as :func:`read_mjcf`."""
+    try:
+        import mujoco
+    except ImportError:
+        complain(
+            path, "model file", "MJCF needs the package mujoco", "pip install 'linkwise[mjcf]'"
+        )
+    # Without a handler MuJoCo prints warnings and appends them to a file in the working directory.
+    previous = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        mj_model = mujoco.MjModel.from_xml_path(os.fspath(path))
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        complain(
+            path,
+            "model file",
+            f"MuJoCo refuses it: {shorten(error, 300)}",
+            "correct the element that it names",
+        )
+    finally:
+        mujoco.set_mju_user_warning(previous)
+    names = Names(mj_model)
+    for field in ("body_pos", "body_quat", "body_mass", "body_ipos", "body_iquat", "body_inertia"):
+        wrong = np.flatnonzero(~np.isfinite(getattr(mj_model, field)).reshape(mj_model.nbody, -1))
+        if wrong.size:
+            body = int(wrong[0]) // max(1, getattr(mj_model, field)[0].size)
+            element = f"body '{shorten(names.body[body])}'"
+            problem = f"{field.removeprefix('body_')} is not finite"
+            complain(path, element, problem, "give finite numbers")
+    return mj_model
+
+
+class Names:
+    """Names of bodies and joints; elements without one are numbered."""
+
+    def __init__(self, mj_model: Any) -> None:
+        self.body = _named([mj_model.body(i).name for i in range(mj_model.nbody)], "body")
+        self.joint = _named([mj_model.joint(i).name for i in range(mj_model.njnt)], "joint")
+
+
+def _named(given: list[str], kind: str) -> list[str]:
+    taken = {name for name in given if name}
+    result = []
+    for index, name in enumerate(given):
+        candidate = name or f"{kind}{index}"
+        while not name and candidate in taken:
+            candidate += "_"
+        taken.add(candidate)
+        result.append(candidate)
+    return result
+
+
+def rotation(quaternion: Array) -> Array:
+    """Rotation matrix of a unit quaternion w, x, y, z."""
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def joints_of(mj_model: Any, body: int) -> range:
+    """Indices of a body's joints."""
+    first = int(mj_model.body_jntadr[body])
+    return range(first, first + int(mj_model.body_jntnum[body]))
+
+
+def _anchor(mj_model: Any, body: int) -> Array:
+    """Origin of a body's link frame in its MJCF body frame."""
+    joints = joints_of(mj_model, body)
+    return np.array(mj_model.jnt_pos[joints[-1]]) if joints else np.zeros(3)
+
+
+def _add_bodies(builder: ModelBuilder, mj_model: Any, names: Names) -> None:
+    builder.add_link(names.body[0])
+    for body in range(1, mj_model.nbody):
+        turned = rotation(mj_model.body_iquat[body])
+        builder.add_link(
+            names.body[body],
+            mass=float(mj_model.body_mass[body]),
+            com=mj_model.body_ipos[body] - _anchor(mj_model, body),
+            inertia=(turned * mj_model.body_inertia[body]) @ turned.T,
+        )
+        parent = int(mj_model.body_parentid[body])
+        placed = {
+            "rotation": rotation(mj_model.body_quat[body]),
+            "translation": mj_model.body_pos[body] - _anchor(mj_model, parent),
+        }
+        inboard = names.body[parent]
+        joints = joints_of(mj_model, body)
+        if joints and KINDS[mj_model.jnt_type[joints[0]]] == "floating":
+            placed = {"rotation": np.eye(3), "translation": np.zeros(3)}
+        if not joints:
+            weld = f"{names.body[body]}_weld"
+            while weld in names.joint:
+                weld += "_"
+            builder.add_joint(weld, "fixed", inboard, names.body[body], **placed)
+        before = np.zeros(3)
+        for joint in joints:
+            anchor = np.array(mj_model.jnt_pos[joint])
+            child = names.body[body]
+            if joint != joints[-1]:
+                child = f"{child}/{names.joint[joint]}"
+                builder.add_link(child)
+            placed["translation"] = placed["translation"] + placed["rotation"] @ (anchor - before)
+            builder.add_joint(
+                names.joint[joint],
+                KINDS[mj_model.jnt_type[joint]],
+                inboard,
+                child,
+                **placed,
+                **_properties(mj_model, joint),
+            )
+            inboard, before = child, anchor
+            placed = {"rotation": np.eye(3), "translation": np.zeros(3)}
+
+
+def _enabled(mj_model: Any, flag: str) -> bool:
+    import mujoco
+
+    return not mj_model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}")
+
+
+def _dofs(mj_model: Any, joint: int) -> slice:
+    first = int(mj_model.jnt_dofadr[joint])
+    return slice(first, first + (6, 3, 1, 1)[mj_model.jnt_type[joint]])
+
+
+def _properties(mj_model: Any, joint: int) -> dict[str, Any]:
+    """Passive forces, rotor inertia and range of one joint, as keywords of add_joint."""
+    dofs = _dofs(mj_model, joint)
+    result: dict[str, Any] = {"armature": _one_or_all(mj_model.dof_armature[dofs])}
+    if _enabled(mj_model, "DAMPER"):
+        result["damping"] = _one_or_all(mj_model.dof_damping[dofs])
+    if _enabled(mj_model, "FRICTIONLOSS"):
+        result["friction"] = _one_or_all(mj_model.dof_frictionloss[dofs])
+    if KINDS[mj_model.jnt_type[joint]] in ("floating", "spherical"):
+        return result
+    result["axis"] = np.array(mj_model.jnt_axis[joint])
+    address = mj_model.jnt_qposadr[joint]
+    zero = float(mj_model.qpos0[address])
+    if _enabled(mj_model, "SPRING"):
+        result["stiffness"] = float(mj_model.jnt_stiffness[joint])
+        result["rest_position"] = float(mj_model.qpos_spring[address]) - zero
+    if mj_model.jnt_limited[joint]:
+        lower, upper = mj_model.jnt_range[joint] - zero
+        result |= {"lower": float(lower), "upper": float(upper)}
+    if mj_model.jnt_actfrclimited[joint]:
+        result["effort"] = float(np.abs(mj_model.jnt_actfrcrange[joint]).max())
+    return result
+
+
+def _one_or_all(values: Array) -> float | list[float]:
+    return float(values[0]) if (values == values[0]).all() else [float(v) for v in values]
+
+
+def _ignored(mj_model: Any) -> Iterator[tuple[str, str, str]]:
+    """Warnings about what the file has and the model has not."""
+    colliding = np.count_nonzero(
+        np.logical_or(mj_model.geom_contype > 0, mj_model.geom_conaffinity > 0)
+    )
+    counts = {
+        "contact": (colliding + mj_model.npair, "geoms that can touch: contacts are ignored"),
+        "equality": (mj_model.neq, "equality constraints ignored: loops stay open"),
+        "tendon": (mj_model.ntendon, "tendons ignored, with their springs and dampers"),
+        "actuator": (mj_model.nu, "actuators ignored: drive the joints instead"),
+        "flex": (mj_model.nflex, "flexible objects ignored"),
+        "plugin": (mj_model.nplugin, "plugins ignored"),
+        "mocap": (mj_model.nmocap, "mocap bodies are fixed where the file draws them"),
+        "gravcomp": (
+            np.count_nonzero(mj_model.body_gravcomp),
+            "bodies with gravity compensation: it is ignored",
+        ),
+    }
+    for element, (count, text) in counts.items():
+        if count:
+            yield "warning", element, f"{count} {text}"
+    if mj_model.opt.density or mj_model.opt.viscosity:
+        yield "warning", "option", "density and viscosity ignored: no fluid forces act"
+    if mj_model.jnt_limited.any():
+        count = np.count_nonzero(mj_model.jnt_limited)
+        yield "info", "range", f"{count} joint ranges kept as numbers: they do not stop the motion"
+    for element, count in (("sensor", mj_model.nsensor), ("keyframe", mj_model.nkey)):
+        if count:
+            yield "info", element, f"{count} ignored"
+
+
+def _joint_notes(mj_model: Any, names: Names) -> Iterator[tuple[str, str, str]]:
+    for joint, name in enumerate(names.joint):
+        if KINDS[mj_model.jnt_type[joint]] == "floating":
+            drawn = mj_model.body_pos[mj_model.jnt_bodyid[joint]]
+            if drawn.any():
+                text = "its zero is at the world's origin; the file draws it at {:g} {:g} {:g}"
+                yield "info", name, text.format(*drawn)
+        several = KINDS[mj_model.jnt_type[joint]] in ("floating", "spherical")
+        if several and mj_model.jnt_stiffness[joint]:
+            yield "warning", name, "its spring is ignored: springs need a hinge or slide joint"
+        if several and mj_model.jnt_limited[joint]:
+            yield "warning", name, "its cone limit is ignored"
+        if (
+            mj_model.jnt_stiffnesspoly[joint].any()
+            or mj_model.dof_dampingpoly[_dofs(mj_model, joint)].any()
+        ):
+            yield "warning", name, "only the linear part of its spring and damper is used"
+        if not several and (zero := mj_model.qpos0[mj_model.jnt_qposadr[joint]]):
+            yield "info", name, f"its position counts from the file's ref, {zero:g}"

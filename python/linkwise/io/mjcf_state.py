@@ -1,0 +1,126 @@
+"""MuJoCo's state vectors in linkwise's coordinates and back.
+
+What differs: MuJoCo writes quaternions w, x, y, z and linkwise x, y, z, w; MuJoCo's hinge and
+slide positions are ``ref`` in the pose drawn in the file, linkwise's are zero there; the linear
+velocity of a MuJoCo free joint is along the world axes, linkwise's along the body's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise._core import InputError
+from linkwise.io.mjcf import KINDS, Names, rotation
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
+
+Array = npt.NDArray[np.float64]
+
+
+def xyzw_from_wxyz(quaternion: npt.ArrayLike) -> Array:
+    """Quaternions (..., 4) from MuJoCo's order to linkwise's."""
+    return np.roll(np.asarray(quaternion, dtype=float), -1, axis=-1)
+
+
+def wxyz_from_xyzw(quaternion: npt.ArrayLike) -> Array:
+    """Quaternions (..., 4) from linkwise's order to MuJoCo's."""
+    return np.roll(np.asarray(quaternion, dtype=float), 1, axis=-1)
+
+
+def position_from_mujoco(model: Model, mj_model: Any, qpos: npt.ArrayLike) -> Array:
+    """linkwise's q (nq,) of MuJoCo's qpos (mj_model.nq,)."""
+    source = _vector(qpos, mj_model.nq, "qpos")
+    q = np.array(model.neutral_configuration(), dtype=float)
+    for name, kind, theirs, _ in _joints(mj_model):
+        ours = model.q_slice(name)
+        values = source[theirs]
+        if kind == "floating":
+            q[ours] = [*values[:3], *xyzw_from_wxyz(values[3:])]
+        elif kind == "spherical":
+            q[ours] = xyzw_from_wxyz(values)
+        else:
+            q[ours] = values - mj_model.qpos0[theirs]
+    return q
+
+
+def position_to_mujoco(model: Model, mj_model: Any, q: npt.ArrayLike) -> Array:
+    """MuJoCo's qpos (mj_model.nq,) of linkwise's q (nq,)."""
+    source = _vector(q, model.nq, "q")
+    qpos = np.array(mj_model.qpos0, dtype=float)
+    for name, kind, theirs, _ in _joints(mj_model):
+        values = source[model.q_slice(name)]
+        if kind == "floating":
+            qpos[theirs] = [*values[:3], *wxyz_from_xyzw(values[3:])]
+        elif kind == "spherical":
+            qpos[theirs] = wxyz_from_xyzw(values)
+        else:
+            qpos[theirs] = values + mj_model.qpos0[theirs]
+    return qpos
+
+
+def velocity_from_mujoco(
+    model: Model, mj_model: Any, qpos: npt.ArrayLike, qvel: npt.ArrayLike
+) -> Array:
+    """linkwise's v (nv,) of MuJoCo's qvel (mj_model.nv,) at qpos."""
+    positions, source = _vector(qpos, mj_model.nq, "qpos"), _vector(qvel, mj_model.nv, "qvel")
+    v = np.zeros(model.nv)
+    for name, kind, where, theirs in _joints(mj_model):
+        values = source[theirs].copy()
+        if kind == "floating":
+            values[:3] = rotation(positions[where][3:]).T @ values[:3]
+        v[model.v_slice(name)] = values
+    return v
+
+
+def velocity_to_mujoco(model: Model, mj_model: Any, qpos: npt.ArrayLike, v: npt.ArrayLike) -> Array:
+    """MuJoCo's qvel (mj_model.nv,) of linkwise's v (nv,), with the position as MuJoCo's qpos."""
+    positions, source = _vector(qpos, mj_model.nq, "qpos"), _vector(v, model.nv, "v")
+    qvel = np.zeros(mj_model.nv)
+    for name, kind, where, theirs in _joints(mj_model):
+        values = source[model.v_slice(name)].copy()
+        if kind == "floating":
+            values[:3] = rotation(positions[where][3:]) @ values[:3]
+        qvel[theirs] = values
+    return qvel
+
+
+def acceleration_from_mujoco(
+    model: Model,
+    mj_model: Any,
+    qpos: npt.ArrayLike,
+    qvel: npt.ArrayLike,
+    qacc: npt.ArrayLike,
+) -> Array:
+    """linkwise's dv/dt (nv,) of MuJoCo's qacc (mj_model.nv,) at qpos, qvel.
+
+    The body's axes turn under a free joint's linear velocity: d(R'v)/dt = R'a - w x R'v.
+    """
+    a = velocity_from_mujoco(model, mj_model, qpos, qacc)
+    v = velocity_from_mujoco(model, mj_model, qpos, qvel)
+    for name, kind, *_ in _joints(mj_model):
+        if kind == "floating":
+            first = model.v_slice(name).start
+            linear, angular = v[first : first + 3], v[first + 3 : first + 6]
+            a[first : first + 3] -= np.cross(angular, linear)
+    return a
+
+
+def _joints(mj_model: Any) -> Iterator[tuple[str, str, slice, slice]]:
+    """Name, type, part of qpos and part of qvel of each joint."""
+    for joint, name in enumerate(Names(mj_model).joint):
+        kind = int(mj_model.jnt_type[joint])
+        q, v = int(mj_model.jnt_qposadr[joint]), int(mj_model.jnt_dofadr[joint])
+        nq, nv = (7, 4, 1, 1)[kind], (6, 3, 1, 1)[kind]
+        yield name, KINDS[kind], slice(q, q + nq), slice(v, v + nv)
+
+
+def _vector(values: npt.ArrayLike, size: int, name: str) -> Array:
+    array = np.asarray(values, dtype=float)
+    if array.shape != (size,):
+        raise InputError(f"{name}: expected shape ({size},), given shape {array.shape}")
+    return array

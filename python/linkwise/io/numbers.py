@@ -1,0 +1,38 @@
+"""Strict reading of numbers: plain decimal text, finite, and within the range of a double."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from linkwise.io.complaint import shorten
+
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\Z")
+_NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)\Z", re.IGNORECASE)
+
+
+def parse_number(text: str) -> float:
+    """The number that ``text`` spells.
+
+    Raises ValueError with the problem in words. ``float`` alone would accept nan, infinity,
+    underscores and digits of other scripts, and turn 1e400 into infinity.
+    """
+    stripped = text.strip(" \t\r\n")
+    if not stripped:
+        raise ValueError("a number is missing")
+    if not _NUMBER.match(stripped):
+        if _NOT_FINITE.match(stripped):
+            raise ValueError(f"'{shorten(stripped)}' is not a finite number")
+        raise ValueError(f"'{shorten(stripped)}' is not a number")
+    value = float(stripped)
+    if math.isinf(value):
+        raise ValueError(f"'{shorten(stripped)}' is too large for a double")
+    return value
+
+
+def parse_numbers(text: str, count: int) -> list[float]:
+    """The ``count`` numbers of a space-separated list; ValueError as for :func:`parse_number`."""
+    words = text.split()
+    if len(words) != count:
+        raise ValueError(f"has {len(words)} numbers instead of {count}")
+    return [parse_number(word) for word in words]

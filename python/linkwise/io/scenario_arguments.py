@@ -1,0 +1,319 @@
+"""Fitting a scenario to its model: joints, bodies, tables and units become simulate() arguments."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise import drives
+from linkwise._core import InputError, Model
+from linkwise.io.complaint import complain, near, shorten
+from linkwise.io.scenario_schema import (
+    FreeSection,
+    LockedSection,
+    PDSection,
+    Quantity,
+    ScenarioFile,
+    Section,
+    SpringSection,
+    TorqueSection,
+    WrenchSection,
+)
+from linkwise.io.table import CsvTable, read_table
+from linkwise.io.units import check_dimension
+from linkwise.record.labels import joint_scalars
+from linkwise.record.schema import QUANTITIES
+
+_D = TypeVar("_D", bound=drives.Drive)
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+\Z")
+_WRENCH_COLUMNS = ("fx", "fy", "fz", "nx", "ny", "nz")
+# Dimension of a quantity along an angle and along a length.
+_KINDS = {
+    "position": ("angle", "length"),
+    "velocity": ("angular velocity", "velocity"),
+    "torque": ("moment", "force"),
+    "stiffness": ("angular stiffness", "stiffness"),
+    "damping": ("angular damping", "damping"),
+}
+
+
+@dataclass(frozen=True)
+class ScenarioSource:
+    """A scenario file's path and what it says."""
+
+    path: Path
+    settings: ScenarioFile
+
+    def resolve(self, path: str) -> Path:
+        """A path in the file, relative to the file's own directory."""
+        return self.path.parent / path
+
+    def complain(self, keys: Sequence[str], problem: str, remedy: str) -> NoReturn:
+        """Raise the InputError about the value at these keys."""
+        complain(self.path, key_path(keys), problem, remedy)
+
+
+def key_path(keys: Sequence[str]) -> str:
+    """Keys as TOML writes them: drive."left.elbow".kp."""
+    return ".".join(k if _BARE_KEY.match(k) else f'"{shorten(k)}"' for k in keys)
+
+
+class ArgumentBuilder:
+    """Fits a scenario's joints, bodies, tables and units to the model."""
+
+    def __init__(self, source: ScenarioSource, model: Model) -> None:
+        self.source = source
+        self.model = model
+        self.joint_names = {name: index for index, name in enumerate(model.joint_names)}
+        self.tables: dict[Path, CsvTable] = {}
+
+    # -- state and output -------------------------------------------------------------------
+
+    def state(self, key: str) -> npt.NDArray[np.float64] | None:
+        """q0 ("position") or v0 ("velocity"); None where the file says nothing."""
+        given: dict[str, Quantity | list[Quantity]] = getattr(self.source.settings.initial, key)
+        if not given:
+            return None
+        model = self.model
+        position = key == "position"
+        state = np.array(model.neutral_configuration()) if position else np.zeros(model.nv)
+        for joint, values in given.items():
+            keys = ("initial", key, joint)
+            units = self._units(joint, keys, positions=position)
+            numbers = self._fit(values, units, keys, _KINDS[key])
+            if "1" in units:
+                numbers[-4:] = self._quaternion(numbers[-4:], keys)
+            state[model.q_slice(joint) if position else model.v_slice(joint)] = numbers
+        return state
+
+    def _quaternion(
+        self, quaternion: npt.NDArray[np.float64], keys: Sequence[str]
+    ) -> npt.NDArray[np.float64]:
+        length = float(np.linalg.norm(quaternion))
+        if abs(length - 1) > 1e-3:
+            self.source.complain(
+                keys, f"its quaternion x y z w has length {length:g}", "give a unit quaternion"
+            )
+        return quaternion / length
+
+    def quantities(self) -> list[str] | None:
+        """Names of what to record."""
+        names = self.source.settings.output.quantities
+        for name in names or ():
+            if name not in QUANTITIES:
+                self.source.complain(
+                    ("output", "quantities"),
+                    f"unknown quantity '{shorten(name)}'",
+                    near(name, QUANTITIES, "known"),
+                )
+        return names
+
+    def joints(self) -> list[str] | None:
+        """Names of the joints to record."""
+        names = self.source.settings.output.joints
+        for name in names or ():
+            self._check_joint(name, ("output", "joints"))
+        return names
+
+    # -- drives -----------------------------------------------------------------------------
+
+    def joint_drives(self) -> dict[str, drives.Drive]:
+        """Drives by joint name."""
+        result: dict[str, drives.Drive] = {}
+        for joint, section in self.source.settings.drive.items():
+            keys = ("drive", joint)
+            self._check_joint(joint, keys)
+            result[joint] = self._drive(joint, section, keys)
+        return result
+
+    def _drive(self, joint: str, section: Section, keys: tuple[str, str]) -> drives.Drive:
+        units = self._units(joint, keys, positions=False)
+        if isinstance(section, TorqueSection):
+            if section.table is not None:
+                names = self._columns(section.table, section.column, section.columns, joint, keys)
+                return drives.Torque(
+                    self._table(section.table, names, units, section.interpolation, keys, "torque")
+                )
+            assert section.value is not None
+            return drives.Torque(
+                self._fit(section.value, units, (*keys, "value"), _KINDS["torque"])
+            )
+        if isinstance(section, PDSection | SpringSection):
+            if len(units) != 1:
+                self.source.complain(
+                    keys,
+                    f"a {section.kind} drive needs a joint of one degree of freedom, "
+                    f"this one has {len(units)}",
+                    "use a torque drive",
+                )
+            if isinstance(section, SpringSection):
+                return self._make(
+                    keys,
+                    drives.Spring,
+                    self._one(section.stiffness, units, (*keys, "stiffness"), "stiffness"),
+                    self._one(section.damping, units, (*keys, "damping"), "damping"),
+                    self._one(section.rest, units, (*keys, "rest"), "position"),
+                )
+            return self._pd(joint, section, units, keys)
+        assert isinstance(section, LockedSection | FreeSection)
+        return drives.Locked() if isinstance(section, LockedSection) else drives.Free()
+
+    def _pd(
+        self, joint: str, section: PDSection, units: list[str], keys: tuple[str, str]
+    ) -> drives.PD:
+        kp = self._one(section.kp, units, (*keys, "kp"), "stiffness")
+        kd = self._one(section.kd, units, (*keys, "kd"), "damping")
+        if section.table is None:
+            assert section.target is not None
+            return self._make(
+                keys,
+                drives.PD,
+                kp,
+                kd,
+                self._one(section.target, units, (*keys, "target"), "position"),
+            )
+        names = self._columns(section.table, section.column, section.columns, joint, keys)
+        table = self._table(section.table, names, units, section.interpolation, keys, "position")
+        return self._make(keys, drives.PD, kp, kd, table)
+
+    def body_wrenches(self) -> dict[str, drives.Wrench]:
+        """External wrenches by body name."""
+        bodies = set(self.model.body_names) | set(self.model.link_names)
+        result = {}
+        for body, section in self.source.settings.wrench.items():
+            if body not in bodies:
+                self.source.complain(
+                    ("wrench", body),
+                    "the model has no such body",
+                    near(body, self.model.body_names, "the bodies are"),
+                )
+            result[body] = self._wrench(section, ("wrench", body))
+        return result
+
+    def _wrench(self, section: WrenchSection, keys: tuple[str, str]) -> drives.Wrench:
+        if section.table is None:
+            zero = [Quantity(0.0, None)] * 3
+            parts = [*(section.force or zero), *(section.moment or zero)]
+            return drives.Wrench([p.value for p in parts], section.frame)
+        names = section.columns or _WRENCH_COLUMNS
+        units = ["m", "m", "m", "rad", "rad", "rad"]
+        table = self._table(section.table, names, units, section.interpolation, keys, "torque")
+        return drives.Wrench(table, section.frame)
+
+    # -- tables -----------------------------------------------------------------------------
+
+    def _csv(self, name: str) -> CsvTable:
+        path = self.source.resolve(name)
+        if path not in self.tables:
+            self.tables[path] = read_table(path)
+        return self.tables[path]
+
+    def _columns(
+        self,
+        name: str,
+        column: str | None,
+        columns: list[str] | None,
+        joint: str,
+        keys: tuple[str, str],
+    ) -> list[str]:
+        """The columns meant: those named, or the one called like the joint, or the only one."""
+        if columns is not None:
+            return columns
+        if column is not None:
+            return [column]
+        names = self._csv(name).names
+        if joint in names:
+            return [joint]
+        if len(names) == 1:
+            return [names[0]]
+        self.source.complain(
+            keys,
+            f"which column of '{shorten(name)}' is meant is not clear",
+            f"add column = one of {', '.join(shorten(n) for n in names[:8])}",
+        )
+
+    def _table(
+        self,
+        name: str,
+        columns: Sequence[str],
+        units: list[str],
+        interpolation: str,
+        keys: tuple[str, str],
+        kind: str,
+    ) -> drives.Table:
+        table = self._csv(name)
+        if len(columns) != len(units):
+            self.source.complain(
+                keys,
+                f"names {len(columns)} columns for {len(units)} components",
+                "give columns = [...] with one name for each",
+            )
+        indices = [table.index(column) for column in columns]
+        for index, unit, column in zip(indices, units, columns, strict=True):
+            try:
+                check_dimension(table.dimensions[index], *_allowed(unit, _KINDS[kind]))
+            except ValueError as error:
+                problem, _, remedy = str(error).partition("; ")
+                complain(table.path, f"column '{shorten(column)}'", problem, remedy, 1)
+        return drives.Table(table.times, table.values[:, indices], interpolation)  # type: ignore[arg-type]
+
+    def _make(self, keys: Sequence[str], kind: type[_D], *values: Any) -> _D:
+        """The drive, with file and key in front of what it complains about."""
+        try:
+            return kind(*values)
+        except InputError as error:
+            problem, _, remedy = str(error).partition("; ")
+            self.source.complain(keys, problem, remedy)
+
+    # -- shared -----------------------------------------------------------------------------
+
+    def _check_joint(self, joint: str, keys: Sequence[str]) -> int:
+        if joint not in self.joint_names:
+            remedy = near(joint, self.joint_names, "the joints are")
+            self.source.complain(keys, f"the model has no joint '{shorten(joint)}'", remedy)
+        return self.joint_names[joint]
+
+    def _units(self, joint: str, keys: Sequence[str], *, positions: bool) -> list[str]:
+        """Per coordinate or velocity of a joint "rad", "m", "1" or "rad or m"."""
+        index = self._check_joint(joint, keys)
+        coordinates, velocities = joint_scalars(self.model, [index])
+        return [str(u) for u in (coordinates if positions else velocities).units]
+
+    def _fit(
+        self,
+        values: Quantity | list[Quantity],
+        units: list[str],
+        keys: Sequence[str],
+        kinds: tuple[str, str],
+    ) -> npt.NDArray[np.float64]:
+        listed = values if isinstance(values, list) else [values]
+        if len(listed) != len(units):
+            self.source.complain(
+                keys,
+                f"has {len(listed)} numbers, the joint needs {len(units)}",
+                "give one number" if len(units) == 1 else f"give a list of {len(units)}",
+            )
+        for quantity, unit in zip(listed, units, strict=True):
+            try:
+                check_dimension(quantity.dimension, *_allowed(unit, kinds))
+            except ValueError as error:
+                problem, _, remedy = str(error).partition("; ")
+                self.source.complain(keys, problem, remedy)
+        return np.array([quantity.value for quantity in listed])
+
+    def _one(self, value: Quantity, units: list[str], keys: Sequence[str], kind: str) -> float:
+        return float(self._fit(value, units, keys, _KINDS[kind])[0])
+
+
+def _allowed(unit: str, kinds: tuple[str, str]) -> tuple[str, ...]:
+    """Dimensions that a quantity along a coordinate of this unit may have."""
+    angular, linear = kinds
+    if unit == "1":
+        return ("number",)
+    return tuple(d for d, u in ((angular, "rad"), (linear, "m")) if u in unit.split(" or "))

@@ -1,0 +1,293 @@
+"""The keys of a scenario file, their types and units, as pydantic models.
+
+What depends on the machine (does the joint exist, is this unit right for a sliding joint) is
+checked in :mod:`linkwise.io.scenario`, once the model is loaded.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, NamedTuple, cast
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, model_validator
+
+from linkwise.io.complaint import shorten
+from linkwise.io.units import check_dimension, parse_quantity
+
+Interpolation = Literal["linear", "cubic"]
+
+
+class Quantity(NamedTuple):
+    """A number in SI and the dimension that its unit stated, None where no unit was given."""
+
+    value: float
+    dimension: str | None
+
+
+def _quantity(value: Any) -> Quantity:
+    if isinstance(value, str):
+        return Quantity(*parse_quantity(value))
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError("is not a number; give a number or a text such as '30 deg'")
+    try:
+        number = float(value)
+    except OverflowError:
+        raise ValueError("is too large for a double; give a smaller number") from None
+    if not math.isfinite(number):
+        raise ValueError(f"is {value}, not a finite number; give a finite number")
+    return Quantity(number, None)
+
+
+def _quantities(value: Any) -> Quantity | list[Quantity]:
+    if isinstance(value, dict):
+        raise ValueError(
+            "is a table where a number belongs; put quotes around a joint name that holds a dot"
+        )
+    return [_quantity(v) for v in value] if isinstance(value, list) else _quantity(value)
+
+
+def _of(*dimensions: str) -> BeforeValidator:
+    def convert(value: Any) -> float:
+        quantity = _quantity(value)
+        check_dimension(quantity.dimension, *dimensions)
+        return quantity.value
+
+    return BeforeValidator(convert)
+
+
+Scalar = Annotated[Quantity, PlainValidator(_quantity)]
+Vector = Annotated[Quantity | list[Quantity], PlainValidator(_quantities)]
+Number = Annotated[float, _of("number")]
+Time = Annotated[float, _of("time"), Field(gt=0)]
+Acceleration = Annotated[float, _of("acceleration")]
+
+
+class Section(BaseModel):
+    """A table of the file: unknown keys are errors, nothing is converted silently."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class ModelSection(Section):
+    """Where the machine comes from: a file, or one of the generators of linkwise.scenes."""
+
+    path: str | None = None
+    chain: dict[str, Any] | None = None
+    tree: dict[str, Any] | None = None
+    srms: dict[str, Any] | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> ModelSection:
+        given = [name for name in type(self).model_fields if getattr(self, name) is not None]
+        if len(given) != 1:
+            problem = "no model is given" if not given else f"{' and '.join(given)} are both given"
+            raise ValueError(
+                f'{problem}; give one: model = "robot.urdf", or [model.chain], [model.tree], '
+                "[model.srms]"
+            )
+        return self
+
+
+class InitialSection(Section):
+    """Initial state by joint name; joints not named are at zero and at rest."""
+
+    position: dict[str, Vector] = {}
+    velocity: dict[str, Vector] = {}
+
+
+class _Tabled(Section):
+    table: str | None = None
+    column: str | None = None
+    columns: list[str] | None = None
+    interpolation: Interpolation = "linear"
+
+    def _check_table(self, other: str, given: bool) -> None:
+        if self.table is None:
+            for name in ("column", "columns", "interpolation"):
+                if name in self.model_fields_set:
+                    raise ValueError(f'{name} belongs to a table; add table = "FILE.csv"')
+            if not given:
+                raise ValueError(f'has neither {other} nor table; give {other} or "FILE.csv"')
+        elif given:
+            raise ValueError(f"has both {other} and table; keep one")
+        if self.column is not None and self.columns is not None:
+            raise ValueError("has both column and columns; keep one")
+
+
+class TorqueSection(_Tabled):
+    """A constant torque, or one from a table."""
+
+    kind: Literal["torque"]
+    value: Vector | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> TorqueSection:
+        self._check_table("value", self.value is not None)
+        return self
+
+
+class PDSection(_Tabled):
+    """A PD controller to a fixed or tabulated target."""
+
+    kind: Literal["pd"]
+    kp: Scalar
+    kd: Scalar
+    target: Scalar | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> PDSection:
+        self._check_table("target", self.target is not None)
+        return self
+
+
+class SpringSection(Section):
+    """A spring and damper to a rest position."""
+
+    kind: Literal["spring"]
+    stiffness: Scalar
+    damping: Scalar = Quantity(0.0, None)
+    rest: Scalar = Quantity(0.0, None)
+
+
+class LockedSection(Section):
+    """The joint stays where it starts."""
+
+    kind: Literal["locked"]
+
+
+class FreeSection(Section):
+    """No drive."""
+
+    kind: Literal["free"]
+
+
+DriveSection = Annotated[
+    TorqueSection | PDSection | SpringSection | LockedSection | FreeSection,
+    Field(discriminator="kind"),
+]
+DRIVES: dict[str, type[Section]] = {
+    "torque": TorqueSection,
+    "pd": PDSection,
+    "spring": SpringSection,
+    "locked": LockedSection,
+    "free": FreeSection,
+}
+
+
+class WrenchSection(_Tabled):
+    """A force and moment on a body, constant or from a table of six columns."""
+
+    force: list[Scalar] | None = Field(default=None, min_length=3, max_length=3)
+    moment: list[Scalar] | None = Field(default=None, min_length=3, max_length=3)
+    frame: Literal["world", "body"] = "world"
+
+    @model_validator(mode="after")
+    def _one(self) -> WrenchSection:
+        self._check_table("force or moment", self.force is not None or self.moment is not None)
+        if self.columns is not None and len(self.columns) != 6:
+            raise ValueError(f"columns has {len(self.columns)} names; name six: fx fy fz nx ny nz")
+        if self.column is not None:
+            raise ValueError("column names one of six; give columns")
+        for name, dimension in (("force", "force"), ("moment", "moment")):
+            for quantity in getattr(self, name) or ():
+                check_dimension(quantity.dimension, dimension)
+        return self
+
+
+class SimulateSection(Section):
+    """Options of the integration and of the solver; see linkwise.simulate."""
+
+    duration: Time
+    tolerance: Annotated[Number, Field(gt=0)] = 1e-6
+    integrator: str = "adams"
+    method: str = "auto"
+    solver: str = "auto"
+    initial_guess: str = "cubic"
+    stop: str = "energy_norm"
+    solver_tolerance: Annotated[Number, Field(gt=0)] | None = None
+    max_iterations: Annotated[int, Field(ge=1)] | None = None
+    step: Time | None = None
+    max_step: Time | None = None
+    threads: Annotated[int, Field(ge=1)] | None = None
+
+
+class OutputSection(Section):
+    """What is recorded, how often, and where."""
+
+    every: Time | None = None
+    quantities: list[str] | None = None
+    joints: list[str] | None = None
+    path: str | None = None
+
+
+class ScenarioFile(Section):
+    """A whole scenario file."""
+
+    model: ModelSection
+    gravity: Annotated[list[Acceleration], Field(min_length=3, max_length=3)] | None = None
+    floating_base: bool = False
+    joint_order: Literal["file", "pinocchio"] = "file"
+    keep_fixed: bool = False
+    mimic: Literal["independent", "error"] = "independent"
+    package_dirs: list[str] = []
+    initial: InitialSection = InitialSection()
+    drive: dict[str, DriveSection] = {}
+    wrench: dict[str, WrenchSection] = {}
+    simulate: SimulateSection
+    output: OutputSection = OutputSection()
+
+
+_SECTIONS: dict[str, type[Section]] = {
+    "model": ModelSection,
+    "initial": InitialSection,
+    "simulate": SimulateSection,
+    "output": OutputSection,
+}
+
+
+def keys_at(location: tuple[str | int, ...]) -> list[str]:
+    """The keys that the table at ``location`` may have, for complaints about unknown ones."""
+    section: type[Section] = ScenarioFile
+    if location[:1] == ("drive",) and len(location) > 2:
+        section = DRIVES[cast(str, location[2])]
+    elif location[:1] == ("wrench",) and len(location) > 1:
+        section = WrenchSection
+    elif location:
+        section = _SECTIONS.get(str(location[0]), ScenarioFile)
+    return list(section.model_fields)
+
+
+def describe(error: dict[str, Any]) -> tuple[tuple[str, ...], str, str]:
+    """Key path, problem and remedy of one pydantic error."""
+    location = tuple(error["loc"])
+    kind, given, context = error["type"], error.get("input"), error.get("ctx", {})
+    path = tuple(str(p) for i, p in enumerate(location) if not (i == 2 and location[0] == "drive"))
+    shown = f"'{shorten(given)}'" if isinstance(given, str) else shorten(given)
+    if kind == "value_error":
+        problem, _, remedy = str(context["error"]).partition("; ")
+        return path, problem, remedy or "give a finite number, with a unit if need be"
+    if kind == "missing":
+        return path, "is missing", f"add {location[-1]} = ..."
+    if kind == "union_tag_not_found":
+        return path, "has no kind", f"add kind = one of {', '.join(DRIVES)}"
+    if kind == "union_tag_invalid":
+        tag = shorten(context.get("tag", ""))
+        return (*path, "kind"), f"'{tag}' is not a kind of drive", f"use one of {', '.join(DRIVES)}"
+    if kind == "literal_error":
+        return path, f"{shown} is not known", f"use {context['expected']}"
+    if kind in ("greater_than", "greater_than_equal"):
+        bound = context.get("gt", context.get("ge"))
+        word = "above" if "gt" in context else "at least"
+        return path, f"is {shown}", f"give a number {word} {bound:g}"
+    if kind in ("too_short", "too_long"):
+        return path, f"has {context['actual_length']} numbers", "give three"
+    wanted = {
+        "string_type": "a text in quotes",
+        "bool_type": "true or false",
+        "int_type": "a whole number",
+        "list_type": "a list in brackets",
+        "dict_type": "a table",
+        "model_type": "a table",
+        "model_attributes_type": "a table",
+    }.get(kind, "what the documentation of scenario files says")
+    return path, f"{shown} does not fit here", f"give {wanted}"

@@ -1,0 +1,214 @@
+"""CSV tables over time: one time column, one column for each driven quantity."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise.io.complaint import complain, near, shorten
+from linkwise.io.files import TABLE_BYTES, read_bytes
+from linkwise.io.numbers import parse_number
+from linkwise.io.units import Unit, parse_unit
+
+_TIME_NAMES = ("time", "t")
+_HEADER = re.compile(r"(.*?)\s*\[([^\[\]]*)\]\Z", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """The columns of a CSV file, in SI units.
+
+    path: the file; times: (n,) seconds, strictly increasing; names: of the other columns;
+    values: (n, len(names)); dimensions: what each column's unit measures, None without a unit.
+    """
+
+    path: str
+    times: npt.NDArray[np.float64]
+    names: tuple[str, ...]
+    values: npt.NDArray[np.float64]
+    dimensions: tuple[str | None, ...]
+
+    def column(self, name: str) -> npt.NDArray[np.float64]:
+        """The values (n,) of a column; InputError with the nearest name if there is none."""
+        return self.values[:, self.index(name)]
+
+    def index(self, name: str) -> int:
+        """The position of a column among ``names``."""
+        if name not in self.names:
+            complain(
+                self.path,
+                f"column '{shorten(name)}'",
+                "does not exist",
+                near(name, self.names, "the columns are"),
+                1,
+            )
+        return self.names.index(name)
+
+
+def read_table(path: str | os.PathLike[str]) -> CsvTable:
+    """Read a CSV table.
+
+    The first line that is neither empty nor a comment (``#``) is the header. One column is called
+    ``time`` or ``t``; the others are free. A name may carry a unit, as in ``elbow [deg]`` or
+    ``time [ms]``; values are converted to SI. Commas separate, semicolons where the header has no
+    comma.
+
+    Raises InputError naming file, line and column for gaps (empty cells, short or empty lines),
+    NaN, infinity, text, time that stands still or runs backwards, fewer than two rows.
+    """
+    text = _decode(path, read_bytes(path, "table", TABLE_BYTES))
+    rows = _rows(path, text)
+    header_line, header = next(rows, (1, []))
+    if not header:
+        complain(path, "table", "is empty", "give a header line and at least two rows")
+    names, units = _header(path, header_line, header)
+    # Arrays of machine numbers: lists of Python objects would take several times the file's size.
+    data = array("d")
+    lines = array("q")
+    for line, cells in rows:
+        data.extend(_numbers(path, line, cells, names))
+        lines.append(line)
+    if len(lines) < 2:
+        complain(
+            path,
+            "table",
+            f"has {'only one row' if lines else 'no rows'} of numbers",
+            "give at least two (a constant needs no table)",
+            lines[-1] if lines else header_line,
+        )
+    table = np.frombuffer(data).reshape(len(lines), len(names))
+    table = table * np.array([unit.factor if unit else 1.0 for unit in units])
+    time_column = next(i for i, name in enumerate(names) if name in _TIME_NAMES)
+    times = np.ascontiguousarray(table[:, time_column])
+    _check_times(path, times, lines)
+    others = [i for i in range(len(names)) if i != time_column]
+    return CsvTable(
+        os.fspath(path),
+        times,
+        tuple(names[i] for i in others),
+        np.ascontiguousarray(table[:, others]),
+        tuple(unit.dimension if (unit := units[i]) else None for i in others),
+    )
+
+
+def _decode(path: str | os.PathLike[str], data: bytes) -> str:
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        complain(path, "table", "is not UTF-8 text", "save it as CSV with UTF-8 encoding", line)
+    if "\0" in text:
+        complain(path, "table", "holds binary data", "give a CSV file")
+    return text
+
+
+def _rows(path: str | os.PathLike[str], text: str) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of each row; empty lines may stand before the header and at the end."""
+    written = (s.strip() for s in io.StringIO(text, newline=None))
+    first = next((s for s in written if s and not s.startswith("#")), "")
+    delimiter = "," if "," in first or ";" not in first else ";"
+    empty: int | None = None
+    started = False
+    for line, raw in enumerate(io.StringIO(text, newline=None), 1):
+        content = raw.strip()
+        if content.startswith("#"):
+            continue
+        if not content:
+            empty = empty or (line if started else None)
+            continue
+        if empty:
+            complain(path, "table", "an empty line is a gap", "delete it or fill the row in", empty)
+        started = True
+        if '"' not in content:
+            yield line, content.split(delimiter)
+            continue
+        try:
+            yield line, next(csv.reader([content], delimiter=delimiter, strict=True))
+        except csv.Error as error:
+            complain(path, "table", f"is not CSV ({error})", "check quotes and separators", line)
+
+
+def _header(
+    path: str | os.PathLike[str], line: int, cells: Sequence[str]
+) -> tuple[list[str], list[Unit | None]]:
+    names: list[str] = []
+    units: list[Unit | None] = []
+    for number, cell in enumerate(cells, 1):
+        match = _HEADER.match(cell.strip()) if len(cell) <= 1000 else None
+        name = match.group(1) if match else cell.strip()
+        element = f"column {number}"
+        if not name:
+            complain(path, element, "has no name", "name every column in the header", line)
+        try:
+            unit = parse_unit(match.group(2)) if match else None
+        except ValueError as error:
+            complain(path, f"{element} '{shorten(name)}'", str(error), "use one of them", line)
+        if name in names:
+            complain(
+                path, f"{element} '{shorten(name)}'", "the name is used twice", "rename one", line
+            )
+        names.append(name)
+        units.append(unit)
+    clocks = [i for i, name in enumerate(names) if name in _TIME_NAMES]
+    if len(clocks) != 1:
+        complain(
+            path,
+            "header",
+            f"has {'no' if not clocks else 'more than one'} time column",
+            "call one column 'time' (columns: "
+            f"{', '.join(shorten(n, 20) for n in names[:8])}{', ...' if len(names) > 8 else ''})",
+            line,
+        )
+    clock = units[clocks[0]]
+    if clock and clock.dimension != "time":
+        problem = f"has a unit of {clock.dimension}"
+        complain(path, "time column", problem, "use s, ms, min or h", line)
+    if len(names) < 2:
+        complain(path, "header", "has only a time column", "add a column of values", line)
+    return names, units
+
+
+def _numbers(
+    path: str | os.PathLike[str], line: int, cells: Sequence[str], names: Sequence[str]
+) -> list[float]:
+    if len(cells) != len(names):
+        complain(
+            path,
+            "row",
+            f"has {len(cells)} cells where the header has {len(names)}",
+            "give every row one number a column",
+            line,
+        )
+    row = []
+    for name, cell in zip(names, cells, strict=True):
+        try:
+            row.append(parse_number(cell))
+        except ValueError as error:
+            problem = "the cell is empty: a gap" if not cell.strip() else str(error)
+            remedy = "give a finite number in every cell"
+            complain(path, f"column '{shorten(name)}'", problem, remedy, line)
+    return row
+
+
+def _check_times(
+    path: str | os.PathLike[str], times: npt.NDArray[np.float64], lines: Sequence[int]
+) -> None:
+    wrong = np.flatnonzero(np.diff(times) <= 0)
+    if wrong.size:
+        k = int(wrong[0]) + 1
+        problem = "stands still" if times[k] == times[k - 1] else "runs backwards"
+        complain(
+            path,
+            "time column",
+            f"time {problem}: {times[k]:g} s after {times[k - 1]:g} s",
+            "sort the rows and give each time once",
+            lines[k],
+        )
