@@ -59,11 +59,11 @@ inline void householder_complement(const Motion<double>* P, int n, Vector6<doubl
       for (int i = 0; i < 6; ++i) Q[c][i] -= s * v[j][i];
     }
   }
-  // P^+T = Q1 R^-T: column by column, R^T dual^T = Q1^T.
-  for (int c = 0; c < n; ++c) {
+  // P^+T = Q1 R^-T: column by column of P^+T R^T = Q1, from the last.
+  for (int c = n - 1; c >= 0; --c) {
     dual[c] = Q[c];
-    for (int l = 0; l < c; ++l)
-      for (int i = 0; i < 6; ++i) dual[c][i] -= R[l][c] * dual[l][i];
+    for (int l = c + 1; l < n; ++l)
+      for (int i = 0; i < 6; ++i) dual[c][i] -= R[c][l] * dual[l][i];
     for (int i = 0; i < 6; ++i) dual[c][i] /= R[c][c];
   }
   for (int c = n; c < 6; ++c) complement[c - n] = Q[c];
