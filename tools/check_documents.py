@@ -1,0 +1,93 @@
+"""Checks that what the documents link to exists: files, pictures, headings.
+
+Run from anywhere: python tools/check_documents.py [repository]. Prints one line per violation and
+exits with status 1 when there is any. Addresses on the network are not looked at.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+FENCE = re.compile(r"^(```|~~~).*?^\1\s*$", re.MULTILINE | re.DOTALL)
+CODE = re.compile(r"`[^`\n]*`")
+COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+LINK = re.compile(r"!?\[[^\]]*\]\(\s*([^)\s]+)[^)]*\)")
+TAG = re.compile(r"<(?:img|a)\b[^>]*?\b(?:src|href)=\"([^\"]+)\"")
+HEADING = re.compile(r"^#{1,6}\s+(.+?)\s*#*\s*$", re.MULTILINE)
+ELSEWHERE = re.compile(r"[a-z][a-z0-9+.-]*:", re.IGNORECASE)
+
+
+def tracked_documents(root: Path) -> list[str]:
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md"]
+    output = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True).stdout
+    return sorted(name for name in output.split("\0") if name and (root / name).is_file())
+
+
+def blank(pattern: re.Pattern[str], text: str) -> str:
+    """The text without what the pattern matches, lines kept."""
+    return pattern.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
+
+
+def links(text: str) -> Iterator[tuple[int, str]]:
+    """Line number and target of every link and picture outside code."""
+    for pattern in (FENCE, COMMENT, CODE):
+        text = blank(pattern, text)
+    for pattern in (LINK, TAG):
+        for match in pattern.finditer(text):
+            yield text.count("\n", 0, match.start()) + 1, match[1]
+
+
+def anchors(text: str) -> set[str]:
+    """The names that headings get, as GitHub makes them; repeated ones are numbered."""
+    names: set[str] = set()
+    for match in HEADING.finditer(blank(FENCE, text)):
+        plain = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", match[1]).replace("`", "").lower()
+        name = first = re.sub(r"[^\w\- ]", "", plain).replace(" ", "-")
+        number = 0
+        while name in names:
+            number += 1
+            name = f"{first}-{number}"
+        names.add(name)
+    return names
+
+
+def check_link(root: Path, path: str, target: str) -> str | None:
+    """What is wrong with one link, or None."""
+    if ELSEWHERE.match(target):
+        return None
+    name, _, anchor = target.partition("#")
+    if name.startswith("/"):
+        return "is absolute; write it relative to the document"
+    file = (root / path).parent / name if name else root / path
+    if not file.resolve().is_relative_to(root.resolve()):
+        return "leaves the repository"
+    if not file.exists():
+        return "does not exist"
+    if anchor and file.suffix == ".md" and anchor not in anchors(file.read_text(encoding="utf-8")):
+        return f"has no heading #{anchor}"
+    return None
+
+
+def check(root: Path, paths: list[str]) -> list[str]:
+    return [
+        f"{path}:{line}: {target}: {problem}"
+        for path in paths
+        for line, target in links((root / path).read_text(encoding="utf-8"))
+        if (problem := check_link(root, path, target))
+    ]
+
+
+def main() -> int:
+    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent
+    violations = check(root, tracked_documents(root))
+    print(*violations, sep="\n", end="\n" if violations else "")
+    print(f"check_documents: {len(violations)} violations")
+    return 1 if violations else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
