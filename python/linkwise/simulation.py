@@ -27,7 +27,7 @@ from linkwise.time_loop import Ending, Progress, run_time_loop
 if TYPE_CHECKING:
     from linkwise._core import Model, Simulation
     from linkwise.drives import Drive, Wrench
-    from linkwise.io.scenario import Scenario
+    from linkwise.scenario import Scenario
     from linkwise.record.store import RunWriter
 
 
@@ -270,7 +270,7 @@ def run_scenario(
     `output`, where given, goes before the scenario's own `[output] path`; without either the run
     stays in memory. See `simulate` for the rest.
     """
-    from linkwise.io.scenario import Scenario, load_scenario
+    from linkwise.scenario import Scenario, load_scenario
 
     loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     model = loaded.load_model()

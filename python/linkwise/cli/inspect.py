@@ -46,7 +46,7 @@ def inspect(
 
 def _load(path: Path, floating_base: bool, package_dirs: Sequence[Path]) -> Model:
     from linkwise.io.load import load
-    from linkwise.io.scenario import load_scenario
+    from linkwise.scenario import load_scenario
 
     if path.suffix.lower() == ".toml":
         return load_scenario(path).load_model()

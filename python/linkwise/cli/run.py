@@ -39,7 +39,7 @@ def run(
 ) -> None:
     """Simulate a SCENARIO file and write the results. Ctrl-C keeps those until then."""
     from linkwise.cli.progress import live_progress
-    from linkwise.io.scenario import load_scenario
+    from linkwise.scenario import load_scenario
     from linkwise.record.claim import unused_path
     from linkwise.simulation import SimulationError, SimulationInterrupted, run_scenario
 

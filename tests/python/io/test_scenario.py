@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from linkwise import drives
 from linkwise._core import InputError
-from linkwise.io.scenario import load_scenario
+from linkwise.scenario import load_scenario
 
 GOOD = """model = "arm.urdf"
 [simulate]

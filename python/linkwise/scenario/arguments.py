@@ -14,7 +14,11 @@ import numpy.typing as npt
 from linkwise import drives
 from linkwise._core import InputError, Model
 from linkwise.io.complaint import complain, near, shorten
-from linkwise.io.scenario_schema import (
+from linkwise.io.table import CsvTable, read_table
+from linkwise.io.units import check_dimension
+from linkwise.record.labels import joint_scalars
+from linkwise.record.schema import QUANTITIES
+from linkwise.scenario.schema import (
     FreeSection,
     LockedSection,
     PDSection,
@@ -25,10 +29,6 @@ from linkwise.io.scenario_schema import (
     TorqueSection,
     WrenchSection,
 )
-from linkwise.io.table import CsvTable, read_table
-from linkwise.io.units import check_dimension
-from linkwise.record.labels import joint_scalars
-from linkwise.record.schema import QUANTITIES
 
 _D = TypeVar("_D", bound=drives.Drive)
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+\Z")

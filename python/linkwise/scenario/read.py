@@ -17,9 +17,8 @@ from linkwise._core import InputError, Model
 from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.files import SCENARIO_BYTES, read_bytes
 from linkwise.io.load import load
-from linkwise.io.scenario_arguments import ArgumentBuilder, ScenarioSource, key_path
-from linkwise.io.scenario_schema import ScenarioFile, describe, keys_at
-
+from linkwise.scenario.arguments import ArgumentBuilder, ScenarioSource, key_path
+from linkwise.scenario.schema import ScenarioFile, describe, keys_at
 
 # tomllib takes time quadratic in the parts of a dotted key: minutes for a file of 100 kB.
 _PART = r"""(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')"""

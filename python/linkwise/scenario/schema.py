@@ -1,7 +1,7 @@
 """The keys of a scenario file, their types and units, as pydantic models.
 
 What depends on the machine (does the joint exist, is this unit right for a sliding joint) is
-checked in :mod:`linkwise.io.scenario`, once the model is loaded.
+checked in :mod:`linkwise.scenario.arguments`, once the model is loaded.
 """
 
 from __future__ import annotations
@@ -289,5 +289,5 @@ def describe(error: dict[str, Any]) -> tuple[tuple[str, ...], str, str]:
         "dict_type": "a table",
         "model_type": "a table",
         "model_attributes_type": "a table",
-    }.get(kind, "what the documentation of scenario files says")
+    }.get(kind, "a value of the right type")
     return path, f"{shown} does not fit here", f"give {wanted}"
