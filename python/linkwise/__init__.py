@@ -50,7 +50,9 @@ _PUBLIC = {
     "Run": "linkwise.result",
     "SimulationError": "linkwise.simulation",
     "SimulationInterrupted": "linkwise.simulation",
+    "load_scenario": "linkwise.scenario",
     "open_run": "linkwise.record.read",
+    "run_scenario": "linkwise.simulation",
     "simulate": "linkwise.simulation",
 }
 _SUBMODULES = ("drives", "scenes")
@@ -86,11 +88,13 @@ __all__ = [
     "kinetic_energy",
     "link_poses",
     "load",
+    "load_scenario",
     "mass_matrix",
     "methods",
     "momentum",
     "open_run",
     "potential_energy",
+    "run_scenario",
     "scenes",
     "simulate",
     "solvers",
@@ -123,9 +127,10 @@ if TYPE_CHECKING:
     )
     from linkwise.drives import PD, Drive, Free, Locked, Spring, Table, Torque, Wrench
     from linkwise.io.load import load
+    from linkwise.scenario import load_scenario
     from linkwise.record.read import open_run
     from linkwise.result import Run
-    from linkwise.simulation import SimulationError, SimulationInterrupted, simulate
+    from linkwise.simulation import SimulationError, SimulationInterrupted, run_scenario, simulate
     from linkwise.time_loop import Progress
 
 

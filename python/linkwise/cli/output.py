@@ -57,7 +57,11 @@ def console(*, stderr: bool = False) -> Console:
     """
     from rich.console import Console
 
-    made = Console(stderr=stderr, highlight=False, soft_wrap=False)
+    class PipeAwareConsole(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError  # `main` decides; Rich would exit with 1
+
+    made = PipeAwareConsole(stderr=stderr, highlight=False, soft_wrap=False)
     if not made.is_terminal:
         made.width = 200
     return made

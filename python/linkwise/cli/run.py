@@ -30,8 +30,8 @@ def run(
             "--output",
             "-o",
             help="Where to write the results (a Zarr store). An earlier run there is replaced. "
-            "By default [output] path of the scenario, or the scenario's name with .zarr in this "
-            "folder, numbered if it exists.",
+            "By default the scenario's output.path, or its name with .zarr in this folder, numbered "
+            "if it exists.",
             show_default=False,
         ),
     ] = None,

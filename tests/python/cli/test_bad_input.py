@@ -71,6 +71,10 @@ def test_wrong_scenarios(linkwise, scenario, old, new, parts):
     assert sorted(os.listdir()) == ["arm.urdf", "swing.toml"]
 
 
+def test_inspect_does_not_overrule_a_scenario(linkwise, scenario):
+    refuse(linkwise("inspect", scenario(), "--floating-base"), "scenario says itself")
+
+
 @pytest.mark.parametrize("output", ["arm.urdf", "results"])
 def test_output_that_is_something_else(linkwise, scenario, output):
     os.mkdir("results")

@@ -30,8 +30,10 @@ def test_demo_follows_its_plan_within_the_arms_torques(linkwise):
     assert linkwise("demo", "--output", "slew.zarr").code == 0
     run = lw.open_run("slew.zarr")
     assert run.outcome == "converged"
-    np.testing.assert_allclose(run.position[-1], demo.END, atol=1e-5)
-    np.testing.assert_allclose(run.velocity[-1], 0, atol=1e-5)
+    # Applied open loop, an error of the tolerance in the rates grows with the time of 10 s.
+    bound = 3 * demo.TOLERANCE * demo.DURATION
+    np.testing.assert_allclose(run.position[-1], demo.END, atol=bound)
+    np.testing.assert_allclose(run.velocity[-1], 0, atol=bound)
     effort = lw.scenes.srms().effort_limit
     assert np.all(np.abs(run.drive_torque) < effort)
     assert np.all(np.abs(run.drive_torque).max("time") > 0)
