@@ -47,6 +47,8 @@ class Table:
     times: (n,) seconds, strictly increasing, n >= 2.
     values: (n,) or (n, k), SI units.
     interpolation: "linear", or "cubic" (a spline with continuous second derivative).
+
+    Before the first and after the last time the values there hold.
     """
 
     times: Array

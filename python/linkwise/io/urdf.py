@@ -76,6 +76,7 @@ def _parse_clean(checked: CheckedUrdf) -> Any:
     import yourdfpy
 
     document = io.BytesIO(etree.tostring(checked.robot))
+    checked.robot.clear()  # of large files one copy less
     robot = yourdfpy.URDF.load(
         document,
         build_scene_graph=False,

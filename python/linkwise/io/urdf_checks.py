@@ -56,6 +56,8 @@ class _Checker:
         self.ignored: Counter[str] = Counter()
         self.joint_lines: dict[str, int | None] = {}
         self.welded: set[str | None] = set()
+        self.children_of: etree._Element | None = None
+        self.children: dict[str, list[etree._Element]] = {}
 
     def run(self) -> CheckedUrdf:
         links, joints = [], []
@@ -315,11 +317,12 @@ class _Checker:
         return name
 
     def _child(self, element: etree._Element, tag: str, title: str) -> etree._Element | None:
-        found = [
-            c
-            for c in element.iterchildren(tag=etree.Element)
-            if local_name(c) == tag and not is_foreign(c, self.root)
-        ]
+        if self.children_of is not element:  # one pass serves all children of an element
+            self.children_of, self.children = element, {}
+            for child in element.iterchildren(tag=etree.Element):
+                if not is_foreign(child, self.root):
+                    self.children.setdefault(local_name(child), []).append(child)
+        found = self.children.get(tag, ())
         if len(found) > 1:
             self._fail(found[1], title, f"has two <{tag}> elements", "keep one")
         return found[0] if found else None

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise import drives
-from linkwise._core import InputError, Model
+from linkwise._core import InputError, Model, integrators, methods, solvers
 from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.table import CsvTable, read_table
 from linkwise.io.units import check_dimension
@@ -113,6 +113,20 @@ class ArgumentBuilder:
                     near(name, QUANTITIES, "known"),
                 )
         return names
+
+    def simulate(self) -> dict[str, Any]:
+        """The options of [simulate]; methods, solvers and integrators must be known by name."""
+        section = self.source.settings.simulate
+        tables = {"integrator": integrators, "method": methods, "solver": solvers}
+        for key, table in tables.items():
+            known = [entry["name"] for entry in table()]
+            if key != "integrator":
+                known.append("auto")
+            name = getattr(section, key)
+            if name not in known:
+                remedy = near(name, known, "known")
+                self.source.complain(("simulate", key), f"unknown {key} '{shorten(name)}'", remedy)
+        return section.model_dump()
 
     def joints(self) -> list[str] | None:
         """Names of the joints to record."""

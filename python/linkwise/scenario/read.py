@@ -60,10 +60,9 @@ class Scenario(ScenarioSource):
         """Keyword arguments of linkwise.simulate. InputError for joints, bodies, columns or units
         that do not fit the model."""
         builder = ArgumentBuilder(self, model)
-        simulate = self.settings.simulate
         output = self.settings.output
         return {
-            **simulate.model_dump(),
+            **builder.simulate(),
             "drives": builder.joint_drives(),
             "wrenches": builder.body_wrenches(),
             "q0": builder.state("position"),

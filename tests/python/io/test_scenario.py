@@ -1,5 +1,6 @@
 """Scenario files: what they become, and one line for each way in which they are wrong."""
 
+import inspect
 import math
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import linkwise as lw
 from linkwise import drives
 from linkwise._core import InputError
 from linkwise.scenario import load_scenario
@@ -182,6 +184,10 @@ def test_state_of_a_floating_base(write, arm):
         arguments(write(f"{top}\n{pose.replace('0, 0, 0.7071, 0.7071', '0, 0, 0, 2')}"))
 
 
+def test_every_argument_is_one_of_simulate(write):
+    inspect.signature(lw.simulate).bind("model", **arguments(write()))
+
+
 UNITS = "known units: rad, deg, rev, m, cm, mm, km, s, ms, min, h, "
 
 
@@ -338,6 +344,19 @@ def test_defect_is_named(write, complaint, text, expected):
         (
             'model = "arm.urdf"\n[simulate]\nduration = 1\nthreads = 1.5',
             ": simulate.threads: 1.5 does not fit here; give a whole number",
+        ),
+        (
+            'model = "arm.urdf"\n[simulate]\nduration = 1\nintegrator = "adam"',
+            ": simulate.integrator: unknown integrator 'adam'; did you mean 'adams'?",
+        ),
+        (
+            'model = "arm.urdf"\n[simulate]\nduration = 1\nmethod = "featherstone"',
+            ": simulate.method: unknown method 'featherstone'; "
+            "known: articulated_body, constraint_force, composite_rigid_body, auto",
+        ),
+        (
+            'model = "arm.urdf"\n[simulate]\nduration = 1\nsolver = "tomas"',
+            ": simulate.solver: unknown solver 'tomas'; did you mean 'thomas'?",
         ),
         (
             "model = 3\n[simulate]\nduration = 1",

@@ -373,7 +373,7 @@ def test_too_large(tmp_path, complaint):
     path = tmp_path / "robot.urdf"
     with path.open("wb") as file:
         file.truncate(2**40)  # a sparse file: takes no space
-    assert ": model file: is larger than 64 MiB; build very large models" in complaint(
+    assert ": model file: is larger than 32 MiB; build very large models" in complaint(
         lw.load, path
     )
 
