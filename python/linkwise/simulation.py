@@ -27,8 +27,8 @@ from linkwise.time_loop import Ending, Progress, run_time_loop
 if TYPE_CHECKING:
     from linkwise._core import Model, Simulation
     from linkwise.drives import Drive, Wrench
-    from linkwise.scenario import Scenario
     from linkwise.record.store import RunWriter
+    from linkwise.scenario import Scenario
 
 
 class SimulationError(RuntimeError):
@@ -184,8 +184,9 @@ def simulate(
             "composite_rigid_body".
         solver: Linear solver of the constraint-force method: "auto", "thomas",
             "conjugate_gradient".
-        initial_guess: Where an iterative solver starts: "zero", "previous", "cubic", ...
-        stop: Stopping test of an iterative solver: "energy_norm" or "relative_change".
+        initial_guess: Where an iterative solver starts: "zero", "previous", "linear", "cubic" or
+            "projection".
+        stop: Stopping test of an iterative solver: "energy_norm", "residual" or "paper".
         solver_tolerance: What that test compares with; follows `tolerance` by default.
         max_iterations: Most iterations of one solution.
         step: Step of the fixed-step integrators [s].

@@ -30,8 +30,8 @@ def run(
             "--output",
             "-o",
             help="Where to write the results (a Zarr store). An earlier run there is replaced. "
-            "By default the scenario's output.path, or its name with .zarr in this folder, numbered "
-            "if it exists.",
+            "By default the scenario's output.path, or its name with .zarr in this folder, "
+            "numbered if it exists.",
             show_default=False,
         ),
     ] = None,
@@ -39,8 +39,8 @@ def run(
 ) -> None:
     """Simulate a SCENARIO file and write the results. Ctrl-C keeps those until then."""
     from linkwise.cli.progress import live_progress
-    from linkwise.scenario import load_scenario
     from linkwise.record.claim import unused_path
+    from linkwise.scenario import load_scenario
     from linkwise.simulation import SimulationError, SimulationInterrupted, run_scenario
 
     loaded = load_scenario(scenario)

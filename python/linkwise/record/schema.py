@@ -42,7 +42,7 @@ _SCALAR_ATTRS: dict[str, dict[str, str]] = {
     "position": {
         "long_name": "joint position",
         "convention": "zero as in the model file; angles are not wrapped; "
-        "quaternions are x, y, z, w and turn the joint frame's axes into the inboard body's",
+        "quaternions are x, y, z, w and take components in the joint frame to the inboard body's",
     },
     "velocity": {
         "long_name": "joint velocity",
