@@ -127,9 +127,9 @@ if TYPE_CHECKING:
     )
     from linkwise.drives import PD, Drive, Free, Locked, Spring, Table, Torque, Wrench
     from linkwise.io.load import load
-    from linkwise.scenario import load_scenario
     from linkwise.record.read import open_run
     from linkwise.result import Run
+    from linkwise.scenario import load_scenario
     from linkwise.simulation import SimulationError, SimulationInterrupted, run_scenario, simulate
     from linkwise.time_loop import Progress
 

@@ -71,6 +71,32 @@ def test_labels_of_each_joint_type(kind, coordinates, rates):
     assert schema.coordinates["dof"].values.tolist() == rates
 
 
+def test_composite_joints_number_their_axes_and_tell_angles_from_lengths():
+    builder = lw.ModelBuilder("stack")
+    for name in ("base", "a", "b"):
+        builder.add_link(name, mass=1.0, inertia=np.eye(3))
+    axes = [("prismatic", (1, 0, 0)), ("revolute", (0, 0, 1)), ("helical", (0, 1, 0), 0.1)]
+    builder.add_joint("stack", "composite", "base", "a", axes=axes)
+    builder.add_joint("single", "composite", "a", "b", axes=axes[:1])
+    schema = build_schema(builder.build())
+    labels = ["stack.1", "stack.2", "stack.3", "single"]
+    assert schema.coordinates["coordinate"].values.tolist() == labels
+    assert schema.coordinates["dof"].values.tolist() == labels
+    assert schema.coordinates["position_units"].values.tolist() == ["m", "rad", "rad", "m"]
+
+
+def test_fixed_joints_carry_loads_and_have_no_coordinates():
+    builder = lw.ModelBuilder("welded")
+    for name in ("base", "a", "b"):
+        builder.add_link(name, mass=1.0, inertia=np.eye(3))
+    builder.add_joint("weld", "fixed", "base", "a")
+    builder.add_joint("hinge", "revolute", "a", "b")
+    schema = build_schema(builder.build(keep_fixed=True))
+    assert schema.coordinates["joint"].values.tolist() == ["weld", "hinge"]
+    assert schema.coordinates["coordinate"].values.tolist() == ["hinge"]
+    assert variable(schema, "joint_load").shape == (2, 6)
+
+
 def test_joint_subset_takes_its_columns():
     model = build(("a", "revolute"), ("ball", "spherical"), ("b", "prismatic"))
     schema = build_schema(model, joints=["b", "a"])
