@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <cstring>
+#include <iterator>
+#include <type_traits>
 #include <utility>
 
 #include "linkwise/base/error.hpp"
@@ -44,9 +46,12 @@ struct Writer {
 struct Reader {
   const std::string& bytes;
   size_t at = 0;
+  [[noreturn]] static void fail(const char* what) {
+    throw InputError(std::string("model data is ") + what +
+                     "; it was not written by this version of linkwise");
+  }
   void take(void* out, size_t n) {
-    if (n > bytes.size() - at)
-      throw InputError("model data is cut short; it was not written by this version of linkwise");
+    if (n > bytes.size() - at) fail("cut short");
     std::memcpy(out, bytes.data() + at, n);
     at += n;
   }
@@ -58,9 +63,21 @@ struct Reader {
   }
   size_t count() {
     const auto n = number<std::uint64_t>();
-    if (n > bytes.size() - at)
-      throw InputError("model data is cut short; it was not written by this version of linkwise");
+    if (n > bytes.size() - at) fail("cut short");
     return n;
+  }
+  /// An enumeration of n values, or a truth value: anything else would be read out of bounds later.
+  template <class E>
+  E choice(int n) {
+    std::underlying_type_t<E> x{};
+    take(&x, sizeof(x));
+    if (x < 0 || x >= n) fail("damaged");
+    return static_cast<E>(x);
+  }
+  bool truth() {
+    const auto x = number<unsigned char>();
+    if (x > 1) fail("damaged");
+    return x != 0;
   }
   std::string text() {
     std::string s(count(), '\0');
@@ -153,9 +170,9 @@ ModelSpec deserialize(const std::string& bytes) {
   spec.name = r.text();
   spec.source = r.text();
   r.take(&spec.gravity.x, 3 * sizeof(double));
-  spec.floating_base = r.number<bool>();
+  spec.floating_base = r.truth();
   spec.floating_joint = r.text();
-  spec.keep_fixed = r.number<bool>();
+  spec.keep_fixed = r.truth();
   spec.prescribed.resize(r.count());
   for (auto& name : spec.prescribed) name = r.text();
   spec.links.resize(r.count());
@@ -168,30 +185,31 @@ ModelSpec deserialize(const std::string& bytes) {
   spec.joints.resize(r.count());
   for (auto& j : spec.joints) {
     j.name = r.text();
-    j.type = r.number<JointType>();
+    j.type = r.choice<JointType>(static_cast<int>(std::size(joint_type_table)));
     j.parent = r.text();
     j.child = r.text();
     r.take(j.rotation.m, sizeof(j.rotation.m));
     r.take(&j.translation.x, 3 * sizeof(double));
     j.axes.resize(r.count());
     for (auto& a : j.axes) {
-      a.kind = r.number<AxisKind>();
+      a.kind = r.choice<AxisKind>(3);
       r.take(&a.axis.x, 3 * sizeof(double));
       a.pitch = r.number<double>();
     }
     j.dof.resize(r.count());
     for (auto& d : j.dof) {
-      d.property = r.number<DofProperty>();
+      d.property = r.choice<DofProperty>(n_dof_properties);
       d.values.resize(r.count());
       r.take(d.values.data(), d.values.size() * sizeof(double));
     }
   }
   spec.notes.resize(r.count());
   for (auto& n : spec.notes) {
-    n.level = r.number<NoteLevel>();
+    n.level = r.choice<NoteLevel>(3);
     n.element = r.text();
     n.text = r.text();
   }
+  if (r.at != bytes.size()) r.fail("damaged");
   return spec;
 }
 
