@@ -1,13 +1,14 @@
 #pragma once
-// Articulated-body recursion [featherstone1983; featherstone2008, ch. 7] for trees and every
-// joint:
+// Articulated-body recursion [featherstone1983; featherstone2008, ch. 7] for trees and every joint:
 //     Y_n = M_n + sum X_k^T Ya_k X_k,  U = Y P,  D = P^T U + armature,  u = tau - P^T p
 //     Ya = Y - U D^-1 U^T,  pa = p + Ya c + U D^-1 u;   du = D^-1 (u - U^T (X a_p + c))
 // Ours differs in the joint frame along z, which makes U a column and D a number for one-axis
-// joints, in packed storage, and in running on lanes. The joint loads cost one more inward sweep.
+// joints, in the placements of hinges (hinge.hpp) with the zeros that their elimination leaves, and
+// in running on lanes. The joint load falls out of the outward sweep: w_n = Ya X a_p + pa.
 #include <vector>
 
 #include "linkwise/kinematics/body_state.hpp"
+#include "linkwise/spatial/hinge.hpp"
 
 namespace linkwise {
 
@@ -16,54 +17,111 @@ class ArticulatedBody {
  public:
   explicit ArticulatedBody(const Model& model)
       : model_(&model),
-        state_(model.n_bodies()),
         body_(model.n_bodies()),
         general_(model.n_general),
-        general_body_(model.n_general) {}
+        general_body_(model.n_general) {
+    bool hinges_only = true;
+    for (const Run& run : model.runs) hinges_only &= run.kind == BodyKind::hinge || run.end == 1;
+    pose_.resize(hinges_only ? 1 : model.n_bodies());
+  }
 
   /// du [nv]; loads [n_joints][6] or null. Returns false when some D is not positive definite:
   /// `failed_body`.
   bool evaluate(const SweepInput<S>& in, S* du, S* loads) {
-    calc_body_states(*model_, in, state_.data(), general_.data());
     failed_body_ = -1;
-    tip_to_base(in);
-    base_to_tip(in, du);
-    if (loads) calc_loads(in.q, loads);
+    if (loads && eliminated_.empty()) eliminated_.resize(model_->n_bodies());
+    calc_velocities(in);
+    if (loads)
+      tip_to_base<true>(in);
+    else
+      tip_to_base<false>(in);
+    if (loads)
+      base_to_tip<true>(in, du);
+    else
+      base_to_tip<false>(in, du);
+    if (loads)
+      store_joint_loads(
+          *model_, in.q, [&](int n) -> const Force<S>& { return body_[n].U; }, loads);
     return failed_body_ < 0;
   }
 
   int failed_body() const { return failed_body_; }
-  const std::vector<BodyState<S>>& states() const { return state_; }
 
  private:
   struct BodyWork {
-    ArticulatedInertia<S> Y;  ///< children's share, then unused
-    Force<S> p;               ///< children's share, then unused
-    Force<S> U;               ///< one-axis joints: Y P; all: later M a + bias, then the joint load
-    S D_inverse, u;
-    Motion<S> a;
+    Motion<S> v;              ///< velocity, then acceleration
+    Force<S> p;               ///< bias wrench, children's share added tip to base
+    ArticulatedInertia<S> Y;  ///< children's share
+    Force<S> U;               ///< one-axis joints: Y P; in the end the joint load
+    S D_inverse, u, cosine, sine;
+  };
+  /// What the joint load needs: w = Ya x + pa for the parent's acceleration x seen at the body.
+  struct Eliminated {
+    ArticulatedInertia<S> Y;
+    Force<S> p;
   };
   struct GeneralWork {
+    Motion<S> c;
     Force<S> U[6];
     S L[36];  ///< Cholesky factor of D, reciprocal diagonal
     S u[6];
   };
 
-  LW_INLINE void give_to_parent(int n, const BodyTopology& body, const ArticulatedInertia<S>& Ya,
-                                const Force<S>& pa) {
-    const Transform<S>& X = state_[n].X;
-    BodyWork& parent = body_[body.parent];
-    const ArticulatedInertia<S> Y = transform_to_parent(X, Ya);
-    const Force<S> p = transpose_times(X, pa);
-    if (body.first_to_give) {
-      parent.Y = Y;
-      parent.p = p;
-    } else {
-      parent.Y += Y;
-      parent.p += p;
-    }
+  static HingePlacement<double> placement(const BodyConstants<double>& k) {
+    return {k.cos_alpha, k.sin_alpha, k.a, k.d};
+  }
+  template <class J>
+  LW_INLINE Motion<S> seen_at_child(int n, const Motion<S>& v) const {
+    if constexpr (J::is_hinge)
+      return to_child(placement(model_->constants[n]), body_[n].cosine, body_[n].sine, v);
+    else
+      return pose_[n] * v;
   }
 
+  void calc_velocities(const SweepInput<S>& in) {
+    const Model& model = *model_;
+    for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+      using J = decltype(joint);
+      for (int n = begin; n < end; ++n) {
+        const BodyTopology& body = model.topology[n];
+        const BodyConstants<double>& k = model.constants[n];
+        BodyWork& w = body_[n];
+        const Motion<S> v_parent = body.parent >= 0 ? body_[body.parent].v : Motion<S>{};
+        if constexpr (is_general<J>) {
+          BodyState<S> state;
+          calc_general_state(model, body, in, v_parent, state, general_[body.general]);
+          pose_[n] = state.X;
+          w.v = state.v;
+          general_body_[body.general].c = state.c;
+        } else {
+          if constexpr (J::is_hinge)
+            sincos(S(in.q[body.q] + k.theta), w.sine, w.cosine);
+          else
+            pose_[n] = J::pose(k.tree, k.pitch, in.q[body.q]);
+          Motion<S> v = seen_at_child<J>(n, v_parent);
+          J::add_rate(v, k.pitch, in.v ? in.v[body.v] : S{});
+          w.v = v;
+        }
+        w.p = cross_dual(w.v, k.inertia * w.v);
+      }
+    });
+    if (!in.external) return;
+    for (int j = 0; j < model.n_joints(); ++j)
+      if (model.joints[j].last_of_body)
+        body_[model.joints[j].body].p -= user_wrench(in.external, model.joints[j], j);
+  }
+
+  LW_INLINE void give_to_parent(const BodyTopology& body, const ArticulatedInertia<S>& Y,
+                                const Force<S>& p) {
+    BodyWork& parent = body_[body.parent];
+    if (body.first_to_give)
+      parent.Y = Y;
+    else
+      parent.Y += Y;
+    parent.p += p;
+  }
+
+  template <bool with_loads>
   void tip_to_base(const SweepInput<S>& in) {
     const Model& model = *model_;
     for_runs_tip_to_base(model, [&](auto joint, int begin, int end) {
@@ -71,35 +129,93 @@ class ArticulatedBody {
       for (int n = end - 1; n >= begin; --n) {
         const BodyTopology& body = model.topology[n];
         const BodyConstants<double>& k = model.constants[n];
-        const BodyState<S>& s = state_[n];
         BodyWork& w = body_[n];
         ArticulatedInertia<S> Y{};
-        Force<S> p = s.bias;
-        if (body.n_children > 0) {
-          Y = w.Y;
-          p += w.p;
-        }
+        if (body.n_children > 0) Y = w.Y;
         add_inertia(Y, k.inertia);
         if constexpr (is_general<J>) {
-          eliminate_general(in, n, body, Y, p);
+          eliminate_general<with_loads>(in, n, body, Y);
         } else {
           const Force<S> U = J::column(Y, k.pitch);
-          const S D = J::project(U, k.pitch) + k.armature;
+          S D = J::project(U, k.pitch);
+          if constexpr (!J::leaves_zero_row) D = D + k.armature;
           check(D, n);
           const S D_inverse = 1.0 / D;
-          const S u = in.tau[body.v] - J::project(p, k.pitch);
+          const S u = in.tau[body.v] - J::project(w.p, k.pitch);
           w.U = U;
           w.D_inverse = D_inverse;
           w.u = u;
-          if (body.parent < 0) continue;
+          if (!with_loads && body.parent < 0) continue;
           const Force<S> V{D_inverse * U.lin, D_inverse * U.ang};
-          subtract_outer(Y, V, U);
-          p += Y * s.c;
-          p += Force<S>{u * V.lin, u * V.ang};
-          give_to_parent(n, body, Y, p);
+          const Motion<S> c = J::bias(w.v, k.pitch, in.v ? in.v[body.v] : S{});
+          if constexpr (J::leaves_zero_row)
+            eliminate_planar<J, with_loads>(n, body, Y, U, V, c, u);
+          else
+            eliminate<with_loads>(n, body, Y, U, V, c, u);
         }
       }
     });
+  }
+
+  template <bool with_loads>
+  LW_INLINE void eliminate(int n, const BodyTopology& body, ArticulatedInertia<S>& Y,
+                           const Force<S>& U, const Force<S>& V, const Motion<S>& c, S u) {
+    subtract_outer(Y, V, U);
+    Force<S> p = body_[n].p;
+    p += Y * c;
+    p += Force<S>{u * V.lin, u * V.ang};
+    if constexpr (with_loads) eliminated_[n] = {Y, p};
+    if (body.parent >= 0)
+      give_to_parent(body, transform_to_parent(pose_[n], Y), transpose_times(pose_[n], p));
+  }
+
+  template <class J, bool with_loads>
+  LW_INLINE void eliminate_planar(int n, const BodyTopology& body, const ArticulatedInertia<S>& Y,
+                                  const Force<S>& U, const Force<S>& V, const Motion<S>& c, S u) {
+    PlanarInertia<S> Z;
+    Z.A = Y.A;
+    Z.A.m[0] -= V.lin.x * U.lin.x;
+    Z.A.m[1] -= V.lin.y * U.lin.x;
+    Z.A.m[2] -= V.lin.y * U.lin.y;
+    Z.A.m[3] -= V.lin.z * U.lin.x;
+    Z.A.m[4] -= V.lin.z * U.lin.y;
+    Z.A.m[5] -= V.lin.z * U.lin.z;
+    Z.B[0] = Y.B.m[0] - V.lin.x * U.ang.x;
+    Z.B[1] = Y.B.m[1] - V.lin.x * U.ang.y;
+    Z.B[2] = Y.B.m[3] - V.lin.y * U.ang.x;
+    Z.B[3] = Y.B.m[4] - V.lin.y * U.ang.y;
+    Z.B[4] = Y.B.m[6] - V.lin.z * U.ang.x;
+    Z.B[5] = Y.B.m[7] - V.lin.z * U.ang.y;
+    Z.xx = Y.C.m[0] - V.ang.x * U.ang.x;
+    Z.xy = Y.C.m[1] - V.ang.y * U.ang.x;
+    Z.yy = Y.C.m[2] - V.ang.y * U.ang.y;
+    // c has no z components, and the moment about z that is left is tau itself.
+    const auto& A = Z.A.m;
+    Force<S> p = body_[n].p;
+    p.lin.x += A[0] * c.lin.x + A[1] * c.lin.y + Z.B[0] * c.ang.x + Z.B[1] * c.ang.y + V.lin.x * u;
+    p.lin.y += A[1] * c.lin.x + A[2] * c.lin.y + Z.B[2] * c.ang.x + Z.B[3] * c.ang.y + V.lin.y * u;
+    p.lin.z += A[3] * c.lin.x + A[4] * c.lin.y + Z.B[4] * c.ang.x + Z.B[5] * c.ang.y + V.lin.z * u;
+    p.ang.x += Z.B[0] * c.lin.x + Z.B[2] * c.lin.y + Z.xx * c.ang.x + Z.xy * c.ang.y + V.ang.x * u;
+    p.ang.y += Z.B[1] * c.lin.x + Z.B[3] * c.lin.y + Z.xy * c.ang.x + Z.yy * c.ang.y + V.ang.y * u;
+    p.ang.z += u;
+    if constexpr (with_loads) {
+      Eliminated& e = eliminated_[n];
+      e.Y.A = Z.A;
+#pragma GCC unroll 6
+      for (int i = 0; i < 6; ++i) e.Y.B.m[i] = Z.B[i];
+      e.Y.C.m[0] = Z.xx;
+      e.Y.C.m[1] = Z.xy;
+      e.Y.C.m[2] = Z.yy;
+      e.p = p;
+    }
+    if (body.parent < 0) return;
+    if constexpr (J::is_hinge) {
+      const auto k = placement(model_->constants[n]);
+      give_to_parent(body, to_parent(k, body_[n].cosine, body_[n].sine, Z),
+                     to_parent(k, body_[n].cosine, body_[n].sine, p));
+    } else {
+      give_to_parent(body, transform_to_parent(pose_[n], Z), transpose_times(pose_[n], p));
+    }
   }
 
   LW_INLINE void check(S D, int n) {
@@ -107,10 +223,12 @@ class ArticulatedBody {
       if (__builtin_expect(!(lane(D, i) > 0), 0)) failed_body_ = n;
   }
 
+  template <bool with_loads>
   void eliminate_general(const SweepInput<S>& in, int n, const BodyTopology& body,
-                         ArticulatedInertia<S>& Y, Force<S>& p) {
+                         ArticulatedInertia<S>& Y) {
     const GeneralState<S>& g = general_[body.general];
     GeneralWork& w = general_body_[body.general];
+    Force<S> p = body_[n].p;
     const auto& armature = model_->dof_values(DofProperty::armature);
     for (int i = 0; i < g.n; ++i) w.U[i] = Y * g.P[i];
     // Cholesky of D = P^T U + armature, rows of L with the reciprocal diagonal.
@@ -128,7 +246,7 @@ class ArticulatedBody {
       }
       w.u[i] = in.tau[g.dof[i]] - dot(g.P[i], p);
     }
-    if (body.parent < 0) return;
+    if (!with_loads && body.parent < 0) return;
     // W = U L^-T, so that U D^-1 U^T = W W^T and U D^-1 u = W (L^-1 u).
     Force<S> W[6];
     S z[6];
@@ -144,11 +262,14 @@ class ArticulatedBody {
       z[i] = r * y;
       subtract_outer(Y, W[i], W[i]);
     }
-    p += Y * state_[n].c;
+    p += Y * w.c;
     for (int i = 0; i < g.n; ++i) p += Force<S>{z[i] * W[i].lin, z[i] * W[i].ang};
-    give_to_parent(n, body, Y, p);
+    if constexpr (with_loads) eliminated_[n] = {Y, p};
+    if (body.parent >= 0)
+      give_to_parent(body, transform_to_parent(pose_[n], Y), transpose_times(pose_[n], p));
   }
 
+  template <bool with_loads>
   void base_to_tip(const SweepInput<S>& in, S* du) {
     const Model& model = *model_;
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
@@ -156,20 +277,52 @@ class ArticulatedBody {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];
-        const BodyState<S>& s = state_[n];
+        const BodyConstants<double>& k = model.constants[n];
         BodyWork& w = body_[n];
-        Motion<S> a = s.X * (body.parent >= 0 ? body_[body.parent].a : ground);
-        a += s.c;
+        const Motion<S> a_parent = body.parent >= 0 ? body_[body.parent].v : ground;
         if constexpr (is_general<J>) {
+          Motion<S> a = pose_[n] * a_parent;
+          if constexpr (with_loads) w.U = load(n, a);
+          a += general_body_[body.general].c;
           accelerate_general(in, body, a, du);
+          w.v = a;
         } else {
+          Motion<S> a = seen_at_child<J>(n, a_parent);
+          Force<S> joint_load;
+          if constexpr (with_loads) {
+            if constexpr (J::leaves_zero_row)
+              joint_load = planar_load(n, a);
+            else
+              joint_load = load(n, a);
+          }
+          a += J::bias(w.v, k.pitch, in.v ? in.v[body.v] : S{});
           const S rate = w.D_inverse * (w.u - dot(a, w.U));
           du[body.v] = rate;
-          J::add_rate(a, model.constants[n].pitch, rate);
+          J::add_rate(a, k.pitch, rate);
+          w.v = a;
+          if constexpr (with_loads) w.U = joint_load;
         }
-        w.a = a;
       }
     });
+  }
+
+  LW_INLINE Force<S> load(int n, const Motion<S>& a) const {
+    Force<S> w = eliminated_[n].Y * a;
+    w += eliminated_[n].p;
+    return w;
+  }
+  LW_INLINE Force<S> planar_load(int n, const Motion<S>& a) const {
+    const Eliminated& e = eliminated_[n];
+    PlanarInertia<S> Z;
+    Z.A = e.Y.A;
+#pragma GCC unroll 6
+    for (int i = 0; i < 6; ++i) Z.B[i] = e.Y.B.m[i];
+    Z.xx = e.Y.C.m[0];
+    Z.xy = e.Y.C.m[1];
+    Z.yy = e.Y.C.m[2];
+    Force<S> w = Z * a;
+    w += e.p;
+    return w;
   }
 
   void accelerate_general(const SweepInput<S>& in, const BodyTopology& body, Motion<S>& a, S* du) {
@@ -193,22 +346,10 @@ class ArticulatedBody {
     copy_prescribed(*model_, body, in, du);
   }
 
-  void calc_loads(const S* q, S* loads) {
-    const Model& model = *model_;
-    for (int n = 0; n < model.n_bodies(); ++n) {
-      body_[n].U = model.constants[n].inertia * body_[n].a;
-      body_[n].U += state_[n].bias;
-    }
-    for (int n = model.n_bodies() - 1; n >= 0; --n)
-      if (const int parent = model.topology[n].parent; parent >= 0)
-        body_[parent].U += transpose_times(state_[n].X, body_[n].U);
-    store_joint_loads(
-        model, q, [&](int n) -> const Force<S>& { return body_[n].U; }, loads);
-  }
-
   const Model* model_;
-  std::vector<BodyState<S>> state_;
   std::vector<BodyWork> body_;
+  std::vector<Transform<S>> pose_;      ///< of bodies that are no hinges
+  std::vector<Eliminated> eliminated_;  ///< made when loads are first asked for
   std::vector<GeneralState<S>> general_;
   std::vector<GeneralWork> general_body_;
   int failed_body_ = -1;

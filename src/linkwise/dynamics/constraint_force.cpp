@@ -7,7 +7,7 @@ namespace linkwise {
 ConstraintForce::ConstraintForce(const Model& model, const DynamicsOptions& options)
     : system_(model),
       solver_(make_solver(options.solver, options.solver_options)),
-      guess_(make_initial_guess(options.initial_guess, options.history)),
+      guess_(make_initial_guess(options.initial_guess, {options.history})),
       f_(system_.A().size()) {}
 
 DynamicsReport ConstraintForce::evaluate(double t, const SweepInput<double>& in, double* du,

@@ -35,7 +35,7 @@ void store_pose(const Transform<double>& X, double* pose) {
 Transform<double> joint_frame(const JointInfo& joint,
                               const std::vector<Transform<double>>& frames) {
   const auto& X = frames[joint.first_element + joint.n_elements - 1];
-  return {joint.to_user * X.R, X.r};
+  return joint.to_user * X;
 }
 
 std::vector<BodyState<double>> states_of(const Model& model, const double* q, const double* v) {
@@ -70,7 +70,7 @@ void body_jacobian(const Model& model, const double* q, int joint, double* J) {
   const int nv = model.nv();
   for (int i = 0; i < 6 * nv; ++i) J[i] = 0;
   const JointInfo& info = model.joints[joint];
-  Transform<double> X{info.to_user, {}};
+  Transform<double> X = info.to_user;
   int body = info.body, last = info.first_element + info.n_elements - 1;
   for (;;) {
     for (int i = last; i >= model.topology[body].first_element; --i) {

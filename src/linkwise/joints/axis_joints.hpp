@@ -20,7 +20,10 @@ LW_INLINE Mat3<S> turn_about_z(const Mat3<C>& R, S cosine, S sine) {
 }
 
 struct RevoluteJoint {
-  static constexpr bool turns = true, slides = false;
+  /// Eliminating the joint leaves an inertia that is zero about z: PlanarInertia.
+  static constexpr bool leaves_zero_row = true;
+  /// The placement is that of Denavit and Hartenberg.
+  static constexpr bool is_hinge = false;
 
   template <class S, class C>
   LW_INLINE static Transform<S> pose(const Transform<C>& tree, C, S q) {
@@ -49,8 +52,18 @@ struct RevoluteJoint {
   }
 };
 
+/// Revolute with the placement of a hinge.
+struct HingeJoint : RevoluteJoint {
+  static constexpr bool is_hinge = true;
+};
+
+/// Revolute with a rotor: its inertia about z remains.
+struct GearedJoint : RevoluteJoint {
+  static constexpr bool leaves_zero_row = false;
+};
+
 struct PrismaticJoint {
-  static constexpr bool turns = false, slides = true;
+  static constexpr bool leaves_zero_row = false, is_hinge = false;
 
   template <class S, class C>
   LW_INLINE static Transform<S> pose(const Transform<C>& tree, C, S q) {
@@ -80,7 +93,7 @@ struct PrismaticJoint {
 
 /// A screw: P = (0, 0, pitch, 0, 0, 1).
 struct HelicalJoint {
-  static constexpr bool turns = true, slides = true;
+  static constexpr bool leaves_zero_row = false, is_hinge = false;
 
   template <class S, class C>
   LW_INLINE static Transform<S> pose(const Transform<C>& tree, C pitch, S q) {

@@ -2,10 +2,33 @@
 // One elementary motion of any kind, for the stacks that the general sweep walks element by
 // element: its transform, its columns of the motion subspace (constant in its own frame), and
 // dq/dt.
+#include <cstdint>
+
 #include "linkwise/joints/axis_joints.hpp"
-#include "linkwise/model/model.hpp"
 
 namespace linkwise {
+
+enum class ElementKind : std::uint8_t {
+  fixed,
+  revolute,
+  prismatic,
+  helical,
+  spherical,
+  planar,
+  floating
+};
+
+/// One motion of a joint: a fixed placement after the previous frame, then the motion. Frames are
+/// turned so that the axis of the first three kinds, and the normal of planar, is z.
+struct Element {
+  ElementKind kind = ElementKind::revolute;
+  bool prescribed = false;
+  int q = 0, v = 0;  ///< first index in q and v
+  int nq = 1, nv = 1;
+  int joint = 0;  ///< the user's joint it belongs to
+  double pitch = 0;
+  Transform<double> placement;  ///< previous frame -> this frame at zero
+};
 
 /// Rotation (child axes in parent components)^T of a quaternion x, y, z, w of any nonzero length.
 template <class S>

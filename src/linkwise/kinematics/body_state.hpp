@@ -5,7 +5,7 @@
 //     external
 // A stack of elements is walked as if its frames were massless bodies, which gives c_n and the
 // columns of P_n in the body's frame without ever forming dP/dt [featherstone2008, ch. 4].
-#include "linkwise/joints/element.hpp"
+#include "linkwise/model/model.hpp"
 
 namespace linkwise {
 
@@ -39,35 +39,33 @@ struct SweepInput {
   double gravity_factor = 1;
 };
 
-/// Calls f(joint, begin, end) for every run of bodies with equal joints; joint is RevoluteJoint,
-/// PrismaticJoint, HelicalJoint or GeneralJoint. One dispatch a run, none a body.
+/// Calls f(joint, begin, end) for every run of bodies with equal joints; joint is one of the
+/// structs of axis_joints.hpp or GeneralJoint. One dispatch a run, none a body.
 struct GeneralJoint {};
 template <class F>
-LW_INLINE void for_runs_base_to_tip(const Model& model, F&& f) {
-  for (const Run& run : model.runs) {
-    if (run.kind == BodyKind::revolute)
-      f(RevoluteJoint{}, run.begin, run.end);
-    else if (run.kind == BodyKind::prismatic)
-      f(PrismaticJoint{}, run.begin, run.end);
-    else if (run.kind == BodyKind::helical)
-      f(HelicalJoint{}, run.begin, run.end);
-    else
-      f(GeneralJoint{}, run.begin, run.end);
+LW_INLINE void dispatch_run(const Run& run, F&& f) {
+  switch (run.kind) {
+    case BodyKind::hinge:
+      return f(HingeJoint{}, run.begin, run.end);
+    case BodyKind::revolute:
+      return f(RevoluteJoint{}, run.begin, run.end);
+    case BodyKind::geared:
+      return f(GearedJoint{}, run.begin, run.end);
+    case BodyKind::prismatic:
+      return f(PrismaticJoint{}, run.begin, run.end);
+    case BodyKind::helical:
+      return f(HelicalJoint{}, run.begin, run.end);
+    case BodyKind::general:
+      return f(GeneralJoint{}, run.begin, run.end);
   }
 }
 template <class F>
+LW_INLINE void for_runs_base_to_tip(const Model& model, F&& f) {
+  for (const Run& run : model.runs) dispatch_run(run, f);
+}
+template <class F>
 LW_INLINE void for_runs_tip_to_base(const Model& model, F&& f) {
-  for (size_t i = model.runs.size(); i-- > 0;) {
-    const Run& run = model.runs[i];
-    if (run.kind == BodyKind::revolute)
-      f(RevoluteJoint{}, run.begin, run.end);
-    else if (run.kind == BodyKind::prismatic)
-      f(PrismaticJoint{}, run.begin, run.end);
-    else if (run.kind == BodyKind::helical)
-      f(HelicalJoint{}, run.begin, run.end);
-    else
-      f(GeneralJoint{}, run.begin, run.end);
-  }
+  for (size_t i = model.runs.size(); i-- > 0;) dispatch_run(model.runs[i], f);
 }
 template <class J>
 inline constexpr bool is_general = std::is_same_v<J, GeneralJoint>;
@@ -108,8 +106,7 @@ void calc_general_state(const Model& model, const BodyTopology& body, const Swee
 template <class S>
 LW_INLINE Force<S> user_wrench(const S* external, const JointInfo& joint, int index) {
   const S* w = external + 6 * index;
-  return {transpose_times(joint.to_user, Vec3<S>{w[0], w[1], w[2]}),
-          transpose_times(joint.to_user, Vec3<S>{w[3], w[4], w[5]})};
+  return transpose_times(joint.to_user, Force<S>{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
 }
 
 /// Fills states (and general for bodies of that kind). in.v may be null: resting.
@@ -174,14 +171,14 @@ void store_joint_loads(const Model& model, const S* q, W&& wrench, S* loads) {
            e >= joint.first_element + joint.n_elements; --e)
         w = transpose_times(element_pose(model.elements[e], q), w);
     }
-    const Vec3<S> f = joint.to_user * w.lin, m = joint.to_user * w.ang;
+    const Force<S> user = inverse_transpose_times(joint.to_user, w);
     S* out = loads + 6 * j;
-    out[0] = f.x;
-    out[1] = f.y;
-    out[2] = f.z;
-    out[3] = m.x;
-    out[4] = m.y;
-    out[5] = m.z;
+    out[0] = user.lin.x;
+    out[1] = user.lin.y;
+    out[2] = user.lin.z;
+    out[3] = user.ang.x;
+    out[4] = user.ang.y;
+    out[5] = user.ang.z;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <queue>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/model/hinge_frames.hpp"
 #include "linkwise/model/validate.hpp"
 
 namespace linkwise {
@@ -129,6 +130,7 @@ class ModelAssembly {
     stack_massless();
     place_joints();
     make_bodies();
+    choose_hinge_frames(m);
     make_runs();
     m.notes.insert(m.notes.end(), spec.notes.begin(), spec.notes.end());
   }
@@ -405,7 +407,7 @@ class ModelAssembly {
     const JointInfo& last = m.joints[chain.back()];
     body.n_elements = static_cast<int>(m.elements.size()) - body.first_element;
     // From the link's axes to the body frame's.
-    constants.inertia = to_parent({last.to_user, {}}, lumped[link]);
+    constants.inertia = to_parent(last.to_user, lumped[link]);
     classify(body, constants);
     if (singular(lumped[link]) && m.singular_body_ < 0) m.singular_body_ = index;
     if (parent >= 0) ++m.topology[parent].n_children;
@@ -427,6 +429,7 @@ class ModelAssembly {
                                                        : BodyKind::helical;
         constants.pitch = e.pitch;
         constants.armature = m.dof_values(DofProperty::armature)[e.v];
+        if (body.kind == BodyKind::revolute && constants.armature > 0) body.kind = BodyKind::geared;
       }
     }
     if (body.kind == BodyKind::general) body.general = m.n_general++;
@@ -442,9 +445,9 @@ class ModelAssembly {
     if (sj >= 0) {
       const int pl = parent_link[sj], pj = joint_of[lead[pl]];
       to_joint = Xform{transpose(s.rotation), s.translation} * from_lead[pl];
-      if (pj >= 0) to_joint = to_joint * Xform{m.joints[pj].to_user, {}};
+      if (pj >= 0) to_joint = to_joint * m.joints[pj].to_user;
     }
-    info.to_user = Mat3<double>::identity();
+    info.to_user = {Mat3<double>::identity(), {}};
     info.first_element = static_cast<int>(m.elements.size());
     Element e;
     e.q = info.q;
@@ -463,7 +466,7 @@ class ModelAssembly {
       e.v += nv;
       to_joint =
           Xform{A, {}};  // the next element starts from this frame, turned back to the user's axes
-      info.to_user = A;
+      info.to_user = {A, {}};
       tree = e.placement;
     };
     if (s.type == JointType::fixed)

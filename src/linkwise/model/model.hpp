@@ -12,35 +12,16 @@
 #include <unordered_map>
 #include <vector>
 
+#include "linkwise/joints/element.hpp"
 #include "linkwise/model/spec.hpp"
 #include "linkwise/spatial/inertia.hpp"
 
 namespace linkwise {
 
-enum class ElementKind : std::uint8_t {
-  fixed,
-  revolute,
-  prismatic,
-  helical,
-  spherical,
-  planar,
-  floating
-};
-
-/// One motion of a joint: a fixed placement after the previous frame, then the motion. Frames are
-/// turned so that the axis of the first three kinds, and the normal of planar, is z.
-struct Element {
-  ElementKind kind = ElementKind::revolute;
-  bool prescribed = false;
-  int q = 0, v = 0;  ///< first index in q and v
-  int nq = 1, nv = 1;
-  int joint = 0;  ///< the user's joint it belongs to
-  double pitch = 0;
-  Transform<double> placement;  ///< previous frame -> this frame at zero
-};
-
-/// How a body is joined, as the sweeps dispatch it: one z element, or anything else.
-enum class BodyKind : std::uint8_t { revolute, prismatic, helical, general };
+/// How a body is joined, as the sweeps dispatch it: one z element, or anything else. A hinge is a
+/// revolute joint without armature whose parent's frame was chosen so that the placement is that of
+/// Denavit and Hartenberg; geared is revolute with armature.
+enum class BodyKind : std::uint8_t { hinge, revolute, geared, prismatic, helical, general };
 
 struct BodyTopology {
   int parent = -1;  ///< body index, -1: ground
@@ -57,6 +38,9 @@ struct BodyConstants {
   Transform<C> tree;  ///< previous frame -> body frame at zero; what one-element bodies need
   Inertia<C> inertia;
   C pitch{}, armature{};
+  /// Of a hinge, after [denavit1955]: from the parent turn about x by alpha, go a along x and d
+  /// along the new z, turn about z by q + theta.
+  C cos_alpha{}, sin_alpha{}, a{}, d{}, theta{};
 };
 
 /// Bodies [begin, end) of one kind.
@@ -71,10 +55,9 @@ struct JointInfo {
   int body;  ///< the body that its stack belongs to
   int first_element = 0, n_elements = 0;
   int q = 0, nq = 0, v = 0, nv = 0;
-  int link;  ///< child link (index into links)
-  Mat3<double>
-      to_user;  ///< turns components of the last element's frame into the user's joint frame
-  bool last_of_body = true;  ///< its frame is the body's frame
+  int link;                   ///< child link (index into links)
+  Transform<double> to_user;  ///< last element's frame -> the user's joint frame
+  bool last_of_body = true;   ///< its frame is the body's frame
 };
 
 /// Where a link of the file is: on which joint's frame (-1: ground), and how it is placed there.

@@ -64,39 +64,44 @@ LW_INLINE void subtract_outer(ArticulatedInertia<S>& Y, const Force<S>& V, const
   }
 }
 
-/// X^T Y X: the inertia seen at the parent frame, B' = R^T B R - A' r~, and with G = B', H = R^T B
-/// R: C' = R^T C R + r~ G - H^T r~.
+/// The inertia H about a frame's origin, seen at the frame that it is shifted from by r:
+/// B' = B - A r~, C' = C + r~ B' - B^T r~.
 template <class S, class T>
-LW_INLINE ArticulatedInertia<Wider<S, T>> transform_to_parent(const Transform<T>& X,
-                                                              const ArticulatedInertia<S>& Y) {
-  using W = Wider<S, T>;
-  const Sym3<W> A = congruence(X.R, Y.A);
-  const Mat3<W> H = congruence(X.R, Y.B);
-  const Sym3<W> C = congruence(X.R, Y.C);
-  const auto& r = X.r;
-  Mat3<W> G;
+LW_INLINE ArticulatedInertia<S> shift_to_parent(const Vec3<T>& r, const ArticulatedInertia<S>& H) {
+  const auto& A = H.A.m;
+  ArticulatedInertia<S> out = H;
+  auto& G = out.B.m;
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i) {
-    const W a0 = A.m[sym_index(i, 0)], a1 = A.m[sym_index(i, 1)], a2 = A.m[sym_index(i, 2)];
-    G.m[3 * i] = H.m[3 * i] - (a1 * r.z - a2 * r.y);
-    G.m[3 * i + 1] = H.m[3 * i + 1] - (a2 * r.x - a0 * r.z);
-    G.m[3 * i + 2] = H.m[3 * i + 2] - (a0 * r.y - a1 * r.x);
+    const S a0 = A[sym_index(i, 0)], a1 = A[sym_index(i, 1)], a2 = A[sym_index(i, 2)];
+    G[3 * i] -= a1 * r.z - a2 * r.y;
+    G[3 * i + 1] -= a2 * r.x - a0 * r.z;
+    G[3 * i + 2] -= a0 * r.y - a1 * r.x;
   }
-  ArticulatedInertia<W> out{A, G, C};
-  // Rows of r~ G minus rows of H^T r~, lower triangle only.
-  const auto rg = [&](int i, int j) -> W {
-    return i == 0 ? r.y * G.m[6 + j] - r.z * G.m[3 + j]
-                  : (i == 1 ? r.z * G.m[j] - r.x * G.m[6 + j] : r.x * G.m[3 + j] - r.y * G.m[j]);
+  // Rows of r~ B' minus rows of B^T r~, lower triangle only.
+  const auto rg = [&](int i, int j) -> S {
+    return i == 0   ? r.y * G[6 + j] - r.z * G[3 + j]
+           : i == 1 ? r.z * G[j] - r.x * G[6 + j]
+                    : r.x * G[3 + j] - r.y * G[j];
   };
-  const auto hr = [&](int i, int j) -> W {
-    const W e0 = H.m[i], e1 = H.m[3 + i], e2 = H.m[6 + i];
-    return j == 0 ? e1 * r.z - e2 * r.y : (j == 1 ? e2 * r.x - e0 * r.z : e0 * r.y - e1 * r.x);
+  const auto hr = [&](int i, int j) -> S {
+    const S e0 = H.B.m[i], e1 = H.B.m[3 + i], e2 = H.B.m[6 + i];
+    return j == 0 ? e1 * r.z - e2 * r.y : j == 1 ? e2 * r.x - e0 * r.z : e0 * r.y - e1 * r.x;
   };
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i)
 #pragma GCC unroll 3
     for (int j = 0; j <= i; ++j) out.C.m[sym_index(i, j)] += rg(i, j) - hr(i, j);
   return out;
+}
+
+/// X^T Y X: the inertia seen at the parent frame.
+template <class S, class T>
+LW_INLINE ArticulatedInertia<Wider<S, T>> transform_to_parent(const Transform<T>& X,
+                                                              const ArticulatedInertia<S>& Y) {
+  using W = Wider<S, T>;
+  return shift_to_parent(
+      X.r, ArticulatedInertia<W>{congruence(X.R, Y.A), congruence(X.R, Y.B), congruence(X.R, Y.C)});
 }
 
 template <class S>
