@@ -1,0 +1,116 @@
+"""What the documents say works: their Python, their commands, their links, their references."""
+
+import importlib.util
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
+COMMAND_LINE = "import sys; sys.argv[0] = 'linkwise'; from linkwise.cli import main; main()"
+LONGEST = 60  # seconds, on a busy machine; an example alone takes less than 10
+
+
+def blocks(document, language):
+    """The code blocks of a document in one language."""
+    pattern = rf"^```{language}\n(.*?)^```"
+    return re.findall(pattern, document.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+
+
+def name(path):
+    return path.relative_to(ROOT).as_posix()
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch):
+    """A folder with the examples, as in the repository, that may be written to."""
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def load_tool(tool):
+    spec = importlib.util.spec_from_file_location(tool, ROOT / "tools" / f"{tool}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("document", [d for d in DOCUMENTS if blocks(d, "python")], ids=name)
+def test_python_of_a_document_runs(document, workplace):
+    names = {"__name__": "document"}
+    for block in blocks(document, "python"):
+        exec(compile(block, name(document), "exec"), names)
+
+
+def commands(document):
+    lines = "\n".join(blocks(document, "bash")).splitlines()
+    return [line for line in lines if line.startswith("linkwise ")]
+
+
+@pytest.mark.parametrize("document", [d for d in DOCUMENTS if commands(d)], ids=name)
+def test_commands_of_a_document_run(document, workplace):
+    for command in commands(document):
+        arguments = shlex.split(command)[1:]
+        done = subprocess.run(
+            [sys.executable, "-c", COMMAND_LINE, *arguments],
+            cwd=workplace,
+            capture_output=True,
+            text=True,
+            timeout=LONGEST,
+            check=False,
+        )
+        assert done.returncode == 0, f"{command}\n{done.stderr}"
+        assert done.stdout
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=name)
+def test_example_prints_what_it_must(example, workplace):
+    done = subprocess.run(
+        [sys.executable, f"examples/{example.name}"],
+        cwd=workplace,
+        capture_output=True,
+        text=True,
+        timeout=LONGEST,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert ": ok" in done.stdout
+    assert "WRONG" not in done.stdout
+
+
+def test_a_wrong_number_ends_an_example(workplace):
+    (workplace / "examples" / "wrong.py").write_text(
+        "from checked import check\n\ncheck('x', 1.0, 2.0, 0.5)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "examples/wrong.py"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert done.stdout.rstrip().endswith("WRONG")
+
+
+def test_the_figure_is_drawn(workplace):
+    subprocess.run(
+        [sys.executable, "examples/02_srms_slew.py", "figure.svg"],
+        cwd=workplace,
+        check=True,
+        capture_output=True,
+        timeout=LONGEST,
+    )
+    assert "<svg" in (workplace / "figure.svg").read_text()
+
+
+@pytest.mark.parametrize("tool", ["check_documents", "check_references"])
+def test_links_and_references_of_the_repository(tool):
+    if not (ROOT / ".git").exists():
+        pytest.skip("not a clone: the tools ask git for the files")
+    checker = load_tool(tool)
+    list_files = getattr(checker, "tracked_documents", None) or checker.tracked_files
+    assert checker.check(ROOT, list_files(ROOT)) == []
