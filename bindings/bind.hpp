@@ -6,5 +6,6 @@ namespace linkwise::bindings {
 void bind_model(nanobind::module_& m);
 void bind_dynamics(nanobind::module_& m);
 void bind_simulation(nanobind::module_& m);
+void bind_solve(nanobind::module_& m);
 
 }  // namespace linkwise::bindings

@@ -8,19 +8,11 @@
 #include "linkwise/integrate/integrator.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "py_model.hpp"
+#include "report.hpp"
+#include "solver_options.hpp"
 
 namespace linkwise::bindings {
 namespace {
-
-struct NumericsError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-struct PyReport {
-  std::string outcome = "converged", method, solver, reason, body;
-  int iterations = 0;
-  double error_estimate = 0;
-};
 
 struct ForwardResult {
   nb::object acceleration, joint_load, constraint_force, report;
@@ -62,14 +54,6 @@ void check_external(const Model& m, const States& s) {
   }
 }
 
-std::string failure_text(const Model& m, const PyReport& report, Outcome outcome) {
-  return "method " + report.method +
-         (report.solver.empty() ? "" : " with solver " + report.solver) + ": " +
-         std::string(message(outcome)) +
-         (report.body.empty() ? "" : " at body '" + report.body + "'" + m.where()) + "; " +
-         std::string(remedy(outcome));
-}
-
 /// tau with the model's passive forces added, one row a system.
 std::vector<double> with_passive(const Model& m, const States& s) {
   std::vector<double> tau(s.count * m.nv());
@@ -87,6 +71,7 @@ struct ForwardOptions {
   std::string method, solver, stop;
   double tolerance;
   int max_iterations;
+  nb::handle solver_options;
 };
 
 DynamicsOptions dynamics_options(const ForwardOptions& o) {
@@ -96,6 +81,7 @@ DynamicsOptions dynamics_options(const ForwardOptions& o) {
   options.solver_options.tolerance = o.tolerance;
   options.solver_options.max_iterations = o.max_iterations;
   options.solver_options.stop = stop_rule_from_name(o.stop);
+  read_solver_options(o.solver_options, options);
   return options;
 }
 
@@ -128,17 +114,18 @@ Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, cons
 nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
                             nb::handle external, bool passive, const std::string& method,
                             const std::string& solver, double tolerance, const std::string& stop,
-                            int max_iterations, bool full) {
+                            int max_iterations, nb::handle solver_options, bool full) {
   const Model& m = *self.model;
   States s(m, q, v, tau, "tau", external);
   check_external(m, s);
-  const ForwardOptions asked{method, solver, stop, tolerance, max_iterations};
+  const ForwardOptions asked{method, solver, stop, tolerance, max_iterations, solver_options};
   const bool plain = (method == "auto" || method == "articulated_body") && solver == "auto";
   PyReport report;
   std::unique_ptr<DynamicsMethod> other;
   if (plain) {
     report.method = "articulated_body";
-    if (full) report.reason = choose_dynamics(m, dynamics_options(asked)).reason;
+    if (full || !solver_options.is_none())
+      report.reason = choose_dynamics(m, dynamics_options(asked)).reason;
   } else {
     const DynamicsOptions options = dynamics_options(asked);
     const Choice choice = choose_dynamics(m, options);
@@ -221,7 +208,7 @@ nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::hand
                        nb::handle external, bool passive, const std::string& method,
                        const std::string& solver) {
   const nb::object result = forward_dynamics(self, q, v, tau, external, passive, method, solver,
-                                             1e-12, "energy_norm", 0, true);
+                                             1e-12, "energy_norm", 0, nb::none(), true);
   const PyReport& report = nb::cast<PyReport&>(nb::cast<ForwardResult&>(result).report);
   if (report.outcome != "converged")
     throw NumericsError("method " + report.method + ": " + report.outcome +
@@ -325,7 +312,7 @@ void bind_dynamics(nb::module_& m) {
   m.def("forward_dynamics", &forward_dynamics, "model"_a, "q"_a, "v"_a, "tau"_a = nb::none(),
         nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
         "solver"_a = "auto", "tolerance"_a = 1e-12, "stop"_a = "energy_norm",
-        "max_iterations"_a = 0, "full"_a = false,
+        "max_iterations"_a = 0, "solver_options"_a = nb::none(), "full"_a = false,
         "Accelerations dv/dt (..., nv) [rad/s2, m/s2] of q (..., nq), v (..., nv), tau (..., nv); "
         "leading axes broadcast.\n\n"
         "external (..., n_bodies, 6): wrench [N, N m] on each body at its joint frame's origin, in "
@@ -334,7 +321,9 @@ void bind_dynamics(nb::module_& m) {
         "solver: names as in\n"
         "linkwise.methods() and linkwise.solvers(), \"auto\" chooses; tolerance, stop and "
         "max_iterations concern\n"
-        "iterative solvers. full returns a ForwardDynamicsResult with joint loads, constraint "
+        "iterative solvers; solver_options is a dictionary of further ones (keys as in "
+        "linkwise.solver_options()) and goes first.\n"
+        "full returns a ForwardDynamicsResult with joint loads, constraint "
         "forces and Report.\n"
         "Raises InputError (a ValueError) on wrong shapes or values, NumericsError when the method "
         "fails.");

@@ -8,6 +8,7 @@
 #include "linkwise/simulate/simulation.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "py_model.hpp"
+#include "solver_options.hpp"
 
 namespace linkwise::bindings {
 namespace {
@@ -249,11 +250,27 @@ nb::dict PySimulation::advance(nb::handle times_in, const nb::object& quantities
   return out;
 }
 
+nb::dict trace_columns(const std::vector<EvaluationTrace>& trace) {
+  std::vector<double> time, seconds, iterations, accepted;
+  for (const EvaluationTrace& row : trace) {
+    time.push_back(row.time);
+    seconds.push_back(row.seconds);
+    iterations.push_back(row.iterations);
+    accepted.push_back(row.accepted);
+  }
+  nb::dict out;
+  out["time"] = to_numpy(time);
+  out["seconds"] = to_numpy(seconds);
+  out["iterations"] = nb::cast(to_numpy(iterations)).attr("astype")("int64");
+  out["accepted"] = nb::cast(to_numpy(accepted)).attr("astype")("bool");
+  return out;
+}
+
 SimulationOptions options_of(const std::string& method, const std::string& solver,
                              const std::string& guess, const std::string& stop,
                              nb::handle solver_tolerance, nb::handle max_iterations,
-                             const std::string& integrator, double tolerance, nb::handle step,
-                             nb::handle max_step) {
+                             nb::handle solver_options, const std::string& integrator,
+                             double tolerance, nb::handle step, nb::handle max_step) {
   SimulationOptions o;
   if (!(tolerance > 0) || !std::isfinite(tolerance))
     throw InputError("tolerance must be a positive number; 1e-6 is usual");
@@ -267,6 +284,7 @@ SimulationOptions options_of(const std::string& method, const std::string& solve
       solver_tolerance.is_none() ? tolerance / 10 : nb::cast<double>(solver_tolerance);
   if (!max_iterations.is_none())
     o.dynamics.solver_options.max_iterations = nb::cast<int>(max_iterations);
+  read_solver_options(solver_options, o.dynamics);
   o.integrator = find_integrator(integrator).kind;
   o.integration.tolerance = tolerance;
   if (!step.is_none()) o.integration.step = nb::cast<double>(step);
@@ -282,16 +300,18 @@ void bind_simulation(nb::module_& m) {
           "__init__",
           [](PySimulation* self, const PyModel& model, const std::string& method,
              const std::string& solver, const std::string& guess, const std::string& stop,
-             nb::object solver_tolerance, nb::object max_iterations, const std::string& integrator,
-             double tolerance, nb::object step, nb::object max_step, nb::object /*threads*/) {
+             nb::object solver_tolerance, nb::object max_iterations, nb::object solver_options,
+             const std::string& integrator, double tolerance, nb::object step, nb::object max_step,
+             nb::object /*threads*/) {
             new (self) PySimulation(
                 model, options_of(method, solver, guess, stop, solver_tolerance, max_iterations,
-                                  integrator, tolerance, step, max_step));
+                                  solver_options, integrator, tolerance, step, max_step));
           },
           "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto",
           "initial_guess"_a = "cubic", "stop"_a = "energy_norm", "solver_tolerance"_a = nb::none(),
-          "max_iterations"_a = nb::none(), "integrator"_a = "adams", "tolerance"_a = 1e-6,
-          "step"_a = nb::none(), "max_step"_a = nb::none(), "threads"_a = nb::none())
+          "max_iterations"_a = nb::none(), "solver_options"_a = nb::none(),
+          "integrator"_a = "adams", "tolerance"_a = 1e-6, "step"_a = nb::none(),
+          "max_step"_a = nb::none(), "threads"_a = nb::none())
       .def("drive_torque", &PySimulation::torque, "joint"_a, "values"_a)
       .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a,
            "interpolation"_a = "linear")
@@ -336,6 +356,15 @@ void bind_simulation(nb::module_& m) {
           "body"_a, "fn"_a, "frame"_a = "world")
       .def("start", &PySimulation::start, "t0"_a, "q0"_a, "v0"_a)
       .def("advance", &PySimulation::advance, "times"_a, "quantities"_a = nb::none())
+      .def(
+          "keep_trace", [](PySimulation& s, bool wanted) { s.simulation.keep_trace(wanted); },
+          "wanted"_a = true,
+          "From the next start on, record every evaluation that the integrator asks for.")
+      .def(
+          "trace", [](const PySimulation& s) { return trace_columns(s.simulation.trace()); },
+          "The evaluations so far, one array entry each: simulated time, seconds spent, "
+          "iterations, "
+          "and whether the step that it ended was accepted.")
       .def_prop_ro("method", [](const PySimulation& s) { return s.simulation.choice().method; })
       .def_prop_ro("solver", [](const PySimulation& s) { return s.simulation.choice().solver; })
       .def_prop_ro("reason", [](const PySimulation& s) { return s.simulation.choice().reason; });

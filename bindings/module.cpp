@@ -18,6 +18,7 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
   linkwise::bindings::bind_model(m);
   linkwise::bindings::bind_dynamics(m);
   linkwise::bindings::bind_simulation(m);
+  linkwise::bindings::bind_solve(m);
 
   m.attr("__name__") = module_name;
 }

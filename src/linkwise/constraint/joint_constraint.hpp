@@ -5,6 +5,7 @@
 // s = tau - I du, so its row reads P^+ (a_n - X a_p - c) + s / I = tau / I: a compliance 1/I on the
 // diagonal of A keeps the system symmetric and local. Prescribed degrees of freedom are
 // constraints.
+#include <algorithm>
 #include <cmath>
 
 #include "linkwise/kinematics/body_state.hpp"
@@ -69,13 +70,74 @@ inline void householder_complement(const Motion<double>* P, int n, Vector6<doubl
   for (int c = n; c < 6; ++c) complement[c - n] = Q[c];
 }
 
+/// Complement and dual of directions p[0..n) of three-space, n <= 3 of full rank. Two of them have
+/// the normal of their plane as complement, three nothing: smooth in p, whatever its sign.
+inline void complement_of_directions(const Vec3<double>* p, int n, Vec3<double>* dual,
+                                     Vec3<double>* complement) {
+  const Vec3<double> unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  if (n == 0) {
+    std::copy(unit, unit + 3, complement);
+  } else if (n == 1) {
+    // The coordinate axes next to the largest component, made orthogonal to p.
+    const double size[3] = {std::abs(p[0].x), std::abs(p[0].y), std::abs(p[0].z)};
+    const int k = size[2] >= size[0] && size[2] >= size[1] ? 2 : size[1] >= size[0] ? 1 : 0;
+    const double square = dot(p[0], p[0]);
+    dual[0] = (1 / square) * p[0];
+    const Vec3<double> first = unit[(k + 1) % 3] - dot(unit[(k + 1) % 3], dual[0]) * p[0];
+    complement[0] = (1 / std::sqrt(dot(first, first))) * first;
+    complement[1] = (1 / std::sqrt(square)) * cross(p[0], complement[0]);
+  } else {
+    Vec3<double> normal = cross(p[0], p[1]);
+    if (n == 2) complement[0] = (1 / std::sqrt(dot(normal, normal))) * normal;
+    const Vec3<double> third = n == 3 ? p[2] : normal;
+    const double volume = dot(normal, third);
+    dual[0] = (1 / volume) * cross(p[1], third);
+    dual[1] = (1 / volume) * cross(third, p[0]);
+    if (n == 3) dual[2] = (1 / volume) * normal;
+  }
+}
+
+/// Complement and dual where every column is a pure translation or a pure rotation; false where one
+/// is neither. Forces and moments stay apart and the columns vary smoothly with the joint: a
+/// polynomial in time through the last forces, the paper's guess, is of no use where the directions
+/// that they are measured along turn, or mix forces within the plane of a motion with moments out
+/// of it.
+inline bool separate_complement(const Motion<double>* P, int n, Vector6<double>* dual,
+                                Vector6<double>* complement) {
+  Vec3<double> axes[2][3], duals[2][3], complements[2][3];
+  int count[2] = {0, 0}, kind[6], place[6];
+  for (int j = 0; j < n; ++j) {
+    const bool turns = dot(P[j].ang, P[j].ang) > 0, slides = dot(P[j].lin, P[j].lin) > 0;
+    if (turns == slides || count[turns] == 3) return false;
+    kind[j] = turns;
+    place[j] = count[turns];
+    axes[turns][count[turns]++] = turns ? P[j].ang : P[j].lin;
+  }
+  int columns = 0;
+  for (int k = 0; k < 2; ++k) {
+    complement_of_directions(axes[k], count[k], duals[k], complements[k]);
+    for (int i = 0; i < 3 - count[k]; ++i) {
+      const Vec3<double>& c = complements[k][i];
+      complement[columns++] = k == 0 ? Vector6<double>{c.x, c.y, c.z, 0, 0, 0}
+                                     : Vector6<double>{0, 0, 0, c.x, c.y, c.z};
+    }
+  }
+  for (int j = 0; j < n; ++j) {
+    const Vec3<double>& d = duals[kind[j]][place[j]];
+    dual[j] = kind[j] == 0 ? Vector6<double>{d.x, d.y, d.z, 0, 0, 0}
+                           : Vector6<double>{0, 0, 0, d.x, d.y, d.z};
+  }
+  return true;
+}
+
 /// P as columns: one for a one-axis joint.
 inline void calc_joint_constraint(const Motion<double>* P, const int* dof, int n,
                                   const std::vector<double>& armature, JointConstraint& out) {
   Vector6<double> complement[6];
   out.free = n;
   out.rows = 0;
-  householder_complement(P, n, out.dual, complement);
+  if (!separate_complement(P, n, out.dual, complement))
+    householder_complement(P, n, out.dual, complement);
   for (int i = 0; i < n; ++i) {
     out.dof[i] = dof[i];
     if (!(armature[dof[i]] > 0)) continue;

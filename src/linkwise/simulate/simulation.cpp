@@ -1,5 +1,6 @@
 #include "linkwise/simulate/simulation.hpp"
 
+#include <chrono>
 #include <cmath>
 
 #include "linkwise/base/error.hpp"
@@ -74,6 +75,7 @@ void Simulation::start(double t0, const double* q0, const double* v0) {
   }
   normalise(y_.data());
   iterations_ = 0;
+  trace_.clear();
   stop_ = pending_ = Stop{};
   integrator_ = make_integrator(options_.integrator, *this, options_.integration);
   integrator_->start(t0, y_);
@@ -96,13 +98,24 @@ bool Simulation::accelerations(DynamicsMethod& method, double t, const double* q
   }
   std::copy(tau_.begin(), tau_.end(), holding_.begin());  // the drives' share, for the record
   add_passive_forces(m, q, v, tau_.data());
-  const DynamicsReport report = method.evaluate(t, in, du, loads);
+  const bool traced = keeps_trace_ && &method == method_.get();
+  const DynamicsReport report =
+      traced ? traced_evaluation(t, in, du, loads) : method.evaluate(t, in, du, loads);
   iterations_ += report.iterations;
   double sum = 0;
   for (int i = 0; i < m.nv(); ++i) sum += du[i];
   if (report.ok() && std::isfinite(sum)) return true;
   record_failure(t, report, du);
   return false;
+}
+
+DynamicsReport Simulation::traced_evaluation(double t, const SweepInput<double>& in, double* du,
+                                             double* loads) {
+  const auto started = std::chrono::steady_clock::now();
+  const DynamicsReport report = method_->evaluate(t, in, du, loads);
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started;
+  trace_.push_back({t, spent.count(), report.iterations, false});
+  return report;
 }
 
 void Simulation::record_failure(double t, const DynamicsReport& report, const double* du) {
@@ -141,7 +154,10 @@ void Simulation::normalise(double* y) {
   }
 }
 
-void Simulation::accepted(double t, const double*) { method_->accepted(t); }
+void Simulation::accepted(double t, const double*) {
+  if (!trace_.empty()) trace_.back().accepted = true;
+  method_->accepted(t);
+}
 
 bool Simulation::advance(double t, const Sample& sample) {
   if (!stop_.ok()) return false;

@@ -28,6 +28,14 @@ struct SimulationStatistics : IntegratorStatistics {
   long iterations = 0;
 };
 
+/// One evaluation of the equations of motion, where a trace is kept.
+struct EvaluationTrace {
+  double time = 0;     ///< simulated
+  double seconds = 0;  ///< spent on accelerations and joint loads, drives left out
+  int iterations = 0;
+  bool accepted = false;  ///< the last evaluation of an accepted step
+};
+
 /// Why a run stopped early.
 struct Stop {
   std::string outcome = "converged";
@@ -54,6 +62,11 @@ class Simulation : private OdeSystem {
 
   const Stop& stop() const { return stop_; }
   SimulationStatistics statistics() const;
+
+  /// From the next start on, records every evaluation that the integrator asks for.
+  void keep_trace(bool wanted) { keeps_trace_ = wanted; }
+  const std::vector<EvaluationTrace>& trace() const { return trace_; }
+
   const Choice& choice() const { return choice_; }
 
  private:
@@ -66,6 +79,8 @@ class Simulation : private OdeSystem {
 
   bool accelerations(DynamicsMethod& method, double t, const double* q, const double* v, double* du,
                      double* loads);
+  DynamicsReport traced_evaluation(double t, const SweepInput<double>& in, double* du,
+                                   double* loads);
   void record_failure(double t, const DynamicsReport& report, const double* du);
   bool write_sample(double t, const Sample& sample);
 
@@ -81,6 +96,8 @@ class Simulation : private OdeSystem {
   std::unique_ptr<Integrator> integrator_;
   std::vector<double> tau_, external_, poses_, y_, du_, holding_;
   long iterations_ = 0;
+  bool keeps_trace_ = false;
+  std::vector<EvaluationTrace> trace_;
   Stop stop_, pending_;
 };
 

@@ -1,0 +1,480 @@
+// Solvers from Python: the tables of guesses, stop rules and options; the system A f = b of a model
+// at a state, to look at and to solve; and an evaluator that keeps its warm starts between calls.
+#include <chrono>
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+
+#include "arrays.hpp"
+#include "bind.hpp"
+#include "linkwise/constraint/tree_system.hpp"
+#include "linkwise/dynamics/serial_part.hpp"
+#include "linkwise/forces/passive.hpp"
+#include "linkwise/solve/registry.hpp"
+#include "linkwise/solve/spectrum.hpp"
+#include "py_model.hpp"
+#include "report.hpp"
+#include "solver_options.hpp"
+
+namespace linkwise::bindings {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+size_t size(int n) { return static_cast<size_t>(n); }
+
+/// One state or several, with rates and torques that may be left out.
+struct StateRows {
+  Argument q, v, tau, external;
+  size_t count;
+  std::vector<double> total_tau, rest;
+
+  StateRows(const Model& m, nb::handle q_, nb::handle v_, nb::handle tau_, nb::handle external_,
+            bool passive, size_t most_axes)
+      : q("q", {size(m.nq())}, q_),
+        v("v", {size(m.nv())}, v_),
+        tau("tau", {size(m.nv())}, tau_),
+        external("external", {size(m.n_joints()), 6}, external_),
+        rest(m.nv()) {
+    if (!q.given) throw InputError("q is missing; give " + std::to_string(m.nq()) + " numbers");
+    const Shape lead = broadcast_leading({&q, &v, &tau, &external});
+    if (lead.size() > most_axes)
+      throw InputError("q has shape " + shape_text(shape_of(q.array)) + "; at most " +
+                       std::to_string(most_axes + 1) + " axes are expected");
+    count = product(lead);
+    total_tau.assign(count * m.nv(), 0.0);
+    for (size_t i = 0; i < count; ++i) {
+      double* row = total_tau.data() + i * m.nv();
+      if (tau.given) std::copy(tau.data + i * m.nv(), tau.data + (i + 1) * m.nv(), row);
+      if (passive)
+        add_passive_forces(m, q.data + i * m.nq(), v.given ? v.data + i * m.nv() : rest.data(),
+                           row);
+    }
+  }
+
+  SweepInput<double> input(const Model& m, size_t i) const {
+    SweepInput<double> in;
+    in.q = q.data + i * m.nq();
+    in.v = v.given ? v.data + i * m.nv() : rest.data();
+    in.tau = total_tau.data() + i * m.nv();
+    in.external = external.given ? external.data + i * 6 * m.n_joints() : nullptr;
+    return in;
+  }
+};
+
+PyReport to_python(const Model& m, const Choice& choice, const Report& r, int body) {
+  PyReport out;
+  out.outcome = to_string(r.outcome);
+  out.method = choice.method;
+  out.solver = choice.solver;
+  out.reason = choice.reason;
+  out.body = body >= 0 ? m.body_name(body) : "";
+  out.iterations = r.iterations;
+  out.error_estimate = r.error_estimate;
+  return out;
+}
+
+/// A f = b of a model at one state. Holds its own copy of the state.
+class PyConstraintSystem {
+ public:
+  PyConstraintSystem(const PyModel& owner, nb::handle q, nb::handle v, nb::handle tau,
+                     nb::handle external, bool passive)
+      : model_(owner.model), system_(*owner.model) {
+    const StateRows rows(*model_, q, v, tau, external, passive, 0);
+    const SweepInput<double> in = rows.input(*model_, 0);
+    keep(q_, in.q, model_->nq());
+    keep(v_, in.v, model_->nv());
+    keep(tau_, in.tau, model_->nv());
+    if (in.external) keep(external_, in.external, 6 * model_->n_joints());
+    system_.assemble(input());
+  }
+
+  const BlockTree& A() const { return system_.A(); }
+  const Model& model() const { return *model_; }
+
+  ArrayOut right_hand_side() const { return to_numpy(system_.b()); }
+
+  std::vector<double> unknowns(nb::handle value, const char* name) const {
+    const Argument given(name, {size(A().size())}, value);
+    if (!given.given || given.array.ndim() != 1)
+      throw InputError(std::string(name) + " must have shape (" + std::to_string(A().size()) +
+                       ",)");
+    return {given.data, given.data + A().size()};
+  }
+
+  ArrayOut multiply(nb::handle x) const {
+    std::vector<double> y(A().size());
+    A().multiply(unknowns(x, "f"), y);
+    return to_numpy(y);
+  }
+
+  double energy_norm(nb::handle x) const {
+    const std::vector<double> f = unknowns(x, "f");
+    std::vector<double> y(f.size());
+    A().multiply(f, y);
+    double sum = 0;
+    for (size_t i = 0; i < f.size(); ++i) sum += f[i] * y[i];
+    return std::sqrt(std::max(0.0, sum));
+  }
+
+  ArrayOut dense() const {
+    const size_t n = A().size();
+    NewArray out({n, n}, {});
+    std::vector<double> unit(n);
+    for (size_t i = 0; i < n; ++i) {
+      unit[i] = 1;
+      A().multiply(unit, {out.data + i * n, n});  // symmetric: rows are columns
+      unit[i] = 0;
+    }
+    return out.array;
+  }
+
+  nb::object sparse() const;
+
+  nb::tuple solve(const std::string& solver, nb::handle guess, double tolerance,
+                  const std::string& stop, int max_iterations, nb::handle solver_options) const {
+    DynamicsOptions options;
+    options.solver_options.tolerance = tolerance;
+    options.solver_options.stop = stop_rule_from_name(stop);
+    options.solver_options.max_iterations = max_iterations;
+    read_solver_options(solver_options, options);
+    const auto made = make_solver(solver, options.solver_options);
+    std::vector<double> f =
+        guess.is_none() ? std::vector<double>(A().size()) : unknowns(guess, "guess");
+    Report report;
+    {
+      const nb::gil_scoped_release release;
+      report = made->solve(A(), system_.b(), f);
+    }
+    const Choice choice{"constraint_force", solver, "as asked for"};
+    const int body = report.node >= 0 ? system_.body_of_node(report.node) : -1;
+    return nb::make_tuple(to_numpy(f), to_python(*model_, choice, report, body));
+  }
+
+  nb::tuple recover(nb::handle f) {
+    NewArray du({size(model_->nv())}, {}), loads({size(model_->n_joints()), 6}, {});
+    system_.recover(input(), unknowns(f, "f"), du.data, loads.data);
+    return nb::make_tuple(du.array, loads.array);
+  }
+
+  Spectrum spectrum(int max_steps) const {
+    SpectrumOptions options;
+    options.max_steps = max_steps;
+    return estimate_spectrum(A(), options);
+  }
+
+  nb::slice rows(const std::string& joint) const {
+    const int node = model_->joints[model_->joint_index(joint)].body;
+    return nb::slice(nb::int_(A().offset[node]), nb::int_(A().offset[node + 1]), nb::int_(1));
+  }
+
+ private:
+  static void keep(std::vector<double>& to, const double* from, int n) {
+    to.assign(from, from + n);
+  }
+  SweepInput<double> input() const {
+    SweepInput<double> in;
+    in.q = q_.data();
+    in.v = v_.data();
+    in.tau = tau_.data();
+    in.external = external_.empty() ? nullptr : external_.data();
+    return in;
+  }
+
+  std::shared_ptr<const Model> model_;
+  TreeSystem system_;
+  std::vector<double> q_, v_, tau_, external_;
+};
+
+/// Triplets of a block tree. A hub contributes the blocks of its clique, which solvers never form.
+struct Triplets {
+  std::vector<double> row, column, value;
+
+  void add_block(const BlockTree& A, int i, int j, const Block& block, bool mirrored) {
+    for (int r = 0; r < A.dim[i]; ++r)
+      for (int c = 0; c < A.dim[j]; ++c) {
+        add(A.offset[i] + r, A.offset[j] + c, block[block_stride * r + c]);
+        if (mirrored) add(A.offset[j] + c, A.offset[i] + r, block[block_stride * r + c]);
+      }
+  }
+  void add(int i, int j, double x) {
+    row.push_back(i);
+    column.push_back(j);
+    value.push_back(x);
+  }
+};
+
+/// left (rows x 6) times C times right^T (6 x columns), times `factor`.
+Block through_body(const Block& left, int rows, const Block& C, const Block& right, int columns,
+                   double factor) {
+  Block half{}, out{};
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < 6; ++c)
+      for (int k = 0; k < 6; ++k)
+        half[block_stride * r + c] += left[block_stride * r + k] * C[block_stride * k + c];
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < columns; ++c)
+      for (int k = 0; k < 6; ++k)
+        out[block_stride * r + c] +=
+            factor * half[block_stride * r + k] * right[block_stride * c + k];
+  return out;
+}
+
+nb::object PyConstraintSystem::sparse() const {
+  const BlockTree& tree = A();
+  Triplets entries;
+  for (int i = 0; i < tree.n(); ++i) {
+    entries.add_block(tree, i, i, tree.diag[i], false);
+    if (tree.parent[i] >= 0 && tree.lever_of[i] < 0)
+      entries.add_block(tree, i, tree.parent[i], tree.parent_block[i], true);
+  }
+  for (const BlockTree::Hub& hub : tree.hubs)
+    for (int i : hub.children) {
+      const Block& H = tree.levers[tree.lever_of[i]];
+      entries.add_block(
+          tree, i, hub.node,
+          through_body(H, tree.dim[i], hub.compliance, hub.inboard, tree.dim[hub.node], -1), true);
+      for (int s : hub.children)
+        if (s < i)
+          entries.add_block(tree, i, s,
+                            through_body(H, tree.dim[i], hub.compliance,
+                                         tree.levers[tree.lever_of[s]], tree.dim[s], 1),
+                            true);
+    }
+  const auto index = [](const std::vector<double>& values) {
+    return nb::cast(to_numpy(values)).attr("astype")("int64");
+  };
+  const nb::object coordinates = nb::make_tuple(index(entries.row), index(entries.column));
+  const nb::object array =
+      nb::module_::import_("scipy.sparse")
+          .attr("coo_array")(nb::make_tuple(to_numpy(entries.value), coordinates),
+                             "shape"_a = nb::make_tuple(tree.size(), tree.size()));
+  return array.attr("tocsr")();
+}
+
+/// A dynamics method with its memory of earlier times, and its clock.
+class PyEvaluator {
+ public:
+  PyEvaluator(const PyModel& owner, DynamicsOptions options)
+      : model_(owner.model),
+        choice_(choose_dynamics(*owner.model, options)),
+        options_(std::move(options)),
+        method_(make_dynamics(*owner.model, options_)) {}
+
+  const Choice& choice() const { return choice_; }
+  void reset() { method_ = make_dynamics(*model_, options_); }
+
+  nb::tuple evaluate(double t, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
+                     bool passive, bool accept) {
+    const Model& m = *model_;
+    const StateRows rows(m, q, v, tau, external, passive, 0);
+    NewArray du({size(m.nv())}, {}), loads({size(m.n_joints()), 6}, {});
+    DynamicsReport report;
+    {
+      const nb::gil_scoped_release release;
+      report = method_->evaluate(t, rows.input(m, 0), du.data, loads.data);
+      if (accept && report.ok()) method_->accepted(t);
+    }
+    return nb::make_tuple(du.array, loads.array, to_python(m, choice_, report, report.body));
+  }
+
+  nb::dict follow(nb::handle times, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
+                  bool passive, double time_limit);
+
+ private:
+  std::shared_ptr<const Model> model_;
+  Choice choice_;
+  DynamicsOptions options_;
+  std::unique_ptr<DynamicsMethod> method_;
+};
+
+nb::dict PyEvaluator::follow(nb::handle times_in, nb::handle q, nb::handle v, nb::handle tau,
+                             nb::handle external, bool passive, double time_limit) {
+  const Model& m = *model_;
+  const StateRows rows(m, q, v, tau, external, passive, 1);
+  const ArrayIn times = as_array(times_in, "times");
+  if (times.ndim() != 1 || times.size() != rows.count)
+    throw InputError("times has shape " + shape_text(shape_of(times)) + " but there are " +
+                     std::to_string(rows.count) + " states");
+  NewArray du({rows.count}, {size(m.nv())});
+  std::vector<double> seconds, iterations, errors;
+  std::vector<Outcome> outcomes;
+  {
+    const nb::gil_scoped_release release;
+    const Clock::time_point begin = Clock::now();
+    for (size_t i = 0; i < rows.count; ++i) {
+      const SweepInput<double> in = rows.input(m, i);
+      const Clock::time_point started = Clock::now();
+      const DynamicsReport report =
+          method_->evaluate(times.data()[i], in, du.data + i * m.nv(), nullptr);
+      seconds.push_back(seconds_since(started));
+      iterations.push_back(report.iterations);
+      errors.push_back(report.error_estimate);
+      outcomes.push_back(report.outcome);
+      method_->accepted(times.data()[i]);
+      if (seconds_since(begin) > time_limit) break;
+    }
+  }
+  nb::list names;
+  for (Outcome outcome : outcomes) names.append(std::string(to_string(outcome)));
+  nb::dict out;
+  out["acceleration"] =
+      nb::cast(du.array)[nb::slice(nb::int_(0), nb::int_(outcomes.size()), nb::int_(1))];
+  out["seconds"] = to_numpy(seconds);
+  out["iterations"] = nb::cast(to_numpy(iterations)).attr("astype")("int64");
+  out["error_estimate"] = to_numpy(errors);
+  out["outcome"] = names;
+  return out;
+}
+
+nb::list initial_guess_list() {
+  nb::list out;
+  for (const InitialGuessEntry& e : initial_guess_table()) {
+    nb::dict d;
+    d["name"] = std::string(e.name);
+    d["description"] = std::string(e.description);
+    d["reference"] = std::string(e.reference);
+    out.append(d);
+  }
+  return out;
+}
+
+nb::list stop_rule_list() {
+  nb::list out;
+  const auto add = [&](StopRule rule, const char* description) {
+    nb::dict d;
+    d["name"] = std::string(to_string(rule));
+    d["description"] = description;
+    out.append(d);
+  };
+  add(StopRule::paper, "the last change, relative to the solution [sharf1993, section 5]");
+  add(StopRule::residual, "the residual, relative to the right-hand side");
+  add(StopRule::energy_norm, "an estimate of the error in the A-norm, relative to the solution");
+  return out;
+}
+
+void bind_system(nb::module_& m) {
+  nb::class_<Spectrum>(m, "Spectrum", "Extreme eigenvalues of D^-1 A, D the block diagonal of A.")
+      .def_ro("smallest", &Spectrum::smallest)
+      .def_ro("largest", &Spectrum::largest)
+      .def_ro("steps", &Spectrum::steps, "Lanczos steps taken.")
+      .def_ro("converged", &Spectrum::converged)
+      .def_prop_ro("condition", &Spectrum::condition)
+      .def_prop_ro("radius", &Spectrum::radius, "Spectral radius of Jacobi's 1 - D^-1 A.");
+  nb::class_<PyConstraintSystem>(
+      m, "ConstraintSystem",
+      "The system A f = b of a model's joint constraint forces at one state [sharf1993].\n\n"
+      "A is symmetric positive definite and follows the joints: a block row a joint, as many rows "
+      "as it constrains directions.")
+      .def(nb::init<const PyModel&, nb::handle, nb::handle, nb::handle, nb::handle, bool>(),
+           "model"_a, "q"_a, "v"_a = nb::none(), "tau"_a = nb::none(), nb::kw_only(),
+           "external"_a = nb::none(), "passive"_a = false,
+           "q (nq,), v (nv,), tau (nv,), external (n_bodies, 6) as in forward_dynamics.")
+      .def_prop_ro("size", [](const PyConstraintSystem& s) { return s.A().size(); })
+      .def_prop_ro("b", &PyConstraintSystem::right_hand_side, nb::rv_policy::move,
+                   "Right-hand side (size,).")
+      .def_prop_ro(
+          "rows_per_joint",
+          [](const PyConstraintSystem& s) {
+            nb::list out;
+            for (int n : s.A().dim) out.append(n);
+            return out;
+          },
+          "Constrained directions of each body's joint.")
+      .def("rows", &PyConstraintSystem::rows, "joint"_a, "Slice of f that belongs to a joint.")
+      .def("dense", &PyConstraintSystem::dense, "A as an array (size, size).")
+      .def("sparse", &PyConstraintSystem::sparse, "A as a scipy.sparse.csr_array.")
+      .def("multiply", &PyConstraintSystem::multiply, "f"_a, "A f.")
+      .def("energy_norm", &PyConstraintSystem::energy_norm, "f"_a,
+           "sqrt(f^T A f): for an error in f the kinetic-energy norm of the acceleration error.")
+      .def("solve", &PyConstraintSystem::solve, "solver"_a = "thomas", nb::kw_only(),
+           "guess"_a = nb::none(), "tolerance"_a = 1e-12, "stop"_a = "energy_norm",
+           "max_iterations"_a = 0, "solver_options"_a = nb::none(),
+           "(f, Report) by a solver of linkwise.solvers(); guess (size,) or None for zero. A solve "
+           "that fails says so\n"
+           "in the Report and returns what it has.")
+      .def("recover", &PyConstraintSystem::recover, "f"_a,
+           "(acceleration (nv,), joint_load (n_joints, 6)) that constraint forces f lead to.")
+      .def("spectrum", &PyConstraintSystem::spectrum, nb::kw_only(), "max_steps"_a = 0,
+           "Estimate by the Lanczos process.")
+      .def(
+          "condition_estimate",
+          [](const PyConstraintSystem& s) { return s.spectrum(0).condition(); },
+          "Condition number of D^-1 A.")
+      .def(
+          "spectral_radius", [](const PyConstraintSystem& s) { return s.spectrum(0).radius(); },
+          "Spectral radius of Jacobi's iteration matrix 1 - D^-1 A.");
+}
+
+void bind_evaluator(nb::module_& m) {
+  nb::class_<PyEvaluator>(
+      m, "Evaluator",
+      "Forward dynamics with a memory: an iterative solver starts from the solutions of earlier "
+      "times, as in a simulation.")
+      .def(
+          "__init__",
+          [](PyEvaluator* self, const PyModel& model, const std::string& method,
+             const std::string& solver, const std::string& guess, double tolerance,
+             const std::string& stop, int max_iterations, nb::handle solver_options) {
+            DynamicsOptions options;
+            options.method = method;
+            options.solver = solver;
+            options.initial_guess = guess;
+            options.solver_options.tolerance = tolerance;
+            options.solver_options.stop = stop_rule_from_name(stop);
+            options.solver_options.max_iterations = max_iterations;
+            read_solver_options(solver_options, options);
+            new (self) PyEvaluator(model, std::move(options));
+          },
+          "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto",
+          "initial_guess"_a = "cubic", "tolerance"_a = 1e-7, "stop"_a = "energy_norm",
+          "max_iterations"_a = 0, "solver_options"_a = nb::none())
+      .def(
+          "evaluate", &PyEvaluator::evaluate, "t"_a, "q"_a, "v"_a = nb::none(),
+          "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(), "passive"_a = false,
+          "accept"_a = true,
+          "(acceleration (nv,), joint_load (n_joints, 6), Report) at time t. accept: later guesses "
+          "may build on it.")
+      .def("follow", &PyEvaluator::follow, "times"_a, "q"_a, "v"_a = nb::none(),
+           "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(), "passive"_a = false,
+           "time_limit"_a = std::numeric_limits<double>::infinity(),
+           "One evaluation a state (n, ...), all accepted: a dictionary of acceleration (n, nv), "
+           "seconds, iterations,\n"
+           "error_estimate (n,) and outcome. Shorter when time_limit seconds have passed.")
+      .def("reset", &PyEvaluator::reset, "Forget earlier times.")
+      .def_prop_ro("method", [](const PyEvaluator& s) { return s.choice().method; })
+      .def_prop_ro("solver", [](const PyEvaluator& s) { return s.choice().solver; });
+}
+
+}  // namespace
+
+void bind_solve(nb::module_& m) {
+  bind_system(m);
+  bind_evaluator(m);
+  m.def("initial_guesses", &initial_guess_list, "The table of initial guesses, as dictionaries.");
+  m.def("stop_rules", &stop_rule_list, "The stop rules of iterative solvers, as dictionaries.");
+  m.def("solver_options", &solver_option_list,
+        "The keys of solver_options={...}, as dictionaries of name, default and description.");
+  m.def(
+      "measure_serial_part",
+      [](const PyModel& self, nb::handle q, nb::handle v, int sums, int repeats) {
+        const StateRows rows(*self.model, q, v, nb::none(), nb::none(), false, 0);
+        if (sums < 0 || repeats < 1) throw InputError("sums must be >= 0 and repeats >= 1");
+        const SerialPart part =
+            measure_serial_part(*self.model, rows.input(*self.model, 0), sums, repeats);
+        nb::dict out;
+        out["sums"] = part.sums;
+        out["velocities"] = part.velocities;
+        return out;
+      },
+      "model"_a, "q"_a, "v"_a = nb::none(), nb::kw_only(), "sums"_a, "repeats"_a = 1000,
+      "Seconds of what no number of processors shortens in an evaluation by constraint forces: "
+      "adding one number a body\n"
+      "`sums` times, and passing the velocities from body to body.");
+}
+
+}  // namespace linkwise::bindings
