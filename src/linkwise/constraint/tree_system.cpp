@@ -1,5 +1,8 @@
 #include "linkwise/constraint/tree_system.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "linkwise/base/error.hpp"
 
 namespace linkwise {
@@ -165,9 +168,11 @@ void TreeSystem::recover(const SweepInput<double>& in, const std::vector<double>
       g_[parent] -= transpose_times(state_[n].X, w_[n]);
   }
   const Motion<double> ground = ground_acceleration<double>(model, in.gravity_factor);
+  double worst = 0, largest = 0;
   for (int n = 0; n < model.n_bodies(); ++n) {
     const int parent = model.topology[n].parent;
     a_[n] = compliance_[n] * g_[n];
+    for (double x : to_array(a_[n])) largest = std::max(largest, std::abs(x));
     Motion<double> relative = state_[n].X * (parent >= 0 ? a_[parent] : ground);
     relative += state_[n].c;
     relative = {a_[n].lin - relative.lin, a_[n].ang - relative.ang};
@@ -177,8 +182,15 @@ void TreeSystem::recover(const SweepInput<double>& in, const std::vector<double>
       for (int r = 0; r < 6; ++r) sum += joint_[n].dual[i][r] * gap[r];
       du[joint_[n].dof[i]] = sum;
     }
+    for (int r = 0; r < joint_[n].rows; ++r) {
+      if (joint_[n].armature_of[r] >= 0) continue;
+      double sum = 0;
+      for (int i = 0; i < 6; ++i) sum += joint_[n].B[r][i] * gap[i];
+      worst = std::max(worst, std::abs(sum));
+    }
     copy_prescribed(model, model.topology[n], in, du);
   }
+  violation_ = largest > 0 ? worst / largest : 0;
   if (loads)
     store_joint_loads(
         model, in.q, [&](int n) -> const Force<double>& { return w_[n]; }, loads);

@@ -25,6 +25,9 @@ class TreeSystem {
   /// du [nv] from the solution f; loads [n_joints][6] or null.
   void recover(const SweepInput<double>& in, const std::vector<double>& f, double* du,
                double* loads);
+  /// Largest violation of a constraint by the accelerations that recover() found, over the largest
+  /// acceleration: what rounding and an inexact f have cost.
+  double violation() const { return violation_; }
   /// Body of a node of A (they are numbered alike).
   int body_of_node(int node) const { return node; }
 
@@ -42,6 +45,7 @@ class TreeSystem {
   std::vector<JointConstraint> joint_;
   std::vector<Force<double>> known_, g_, w_;
   std::vector<Motion<double>> a_;
+  double violation_ = 0;
 };
 
 }  // namespace linkwise

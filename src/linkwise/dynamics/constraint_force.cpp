@@ -5,10 +5,12 @@
 namespace linkwise {
 
 ConstraintForce::ConstraintForce(const Model& model, const DynamicsOptions& options)
-    : system_(model),
+    : model_(&model),
+      system_(model),
       solver_(make_solver(options.solver, options.solver_options)),
       guess_(make_initial_guess(options.initial_guess, {options.history})),
-      f_(system_.A().size()) {}
+      f_(system_.A().size()),
+      direct_(find_solver(options.solver).kind == SolverKind::direct) {}
 
 DynamicsReport ConstraintForce::evaluate(double t, const SweepInput<double>& in, double* du,
                                          double* loads) {
@@ -18,6 +20,31 @@ DynamicsReport ConstraintForce::evaluate(double t, const SweepInput<double>& in,
   if (report.node >= 0) report.body = system_.body_of_node(report.node);
   guess_->solved(t, f_);
   system_.recover(in, f_, du, loads);
+  constexpr double acceptable_violation = 1e-12;
+  if (direct_ && report.ok() && system_.violation() > acceptable_violation) return correct(in, du, loads);
+  return report;
+}
+
+DynamicsReport ConstraintForce::correct(const SweepInput<double>& in, double* du, double* loads) {
+  if (!inverse_) inverse_ = std::make_unique<InverseDynamics<double>>(*model_);
+  const size_t nv = model_->nv();
+  missing_.resize(nv);
+  ddu_.resize(nv);
+  df_.resize(f_.size());
+  inverse_->evaluate(in, du, missing_.data(), nullptr);
+  for (size_t i = 0; i < nv; ++i) missing_[i] = in.tau[i] - missing_[i];
+  SweepInput<double> rest;
+  rest.q = in.q;
+  rest.tau = missing_.data();
+  rest.gravity_factor = 0;
+  if (loads) dloads_.resize(6 * model_->n_joints());
+  system_.assemble(rest);
+  const DynamicsReport report{solver_->solve(system_.A(), system_.b(), df_)};
+  system_.recover(rest, df_, ddu_.data(), loads ? dloads_.data() : nullptr);
+  for (size_t i = 0; i < nv; ++i) du[i] += ddu_[i];
+  for (size_t i = 0; i < f_.size(); ++i) f_[i] += df_[i];
+  if (loads)
+    for (size_t i = 0; i < dloads_.size(); ++i) loads[i] += dloads_[i];
   return report;
 }
 
