@@ -48,6 +48,7 @@ class ArticulatedBody {
   int failed_body() const { return failed_body_; }
 
  private:
+  static constexpr double smallest_pivot = 1e-13;
   struct BodyWork {
     Motion<S> v;              ///< velocity, then acceleration
     Force<S> p;               ///< bias wrench, children's share added tip to base
@@ -220,7 +221,7 @@ class ArticulatedBody {
 
   LW_INLINE void check(S D, int n) {
     for (int i = 0; i < lane_count<S>; ++i)
-      if (__builtin_expect(!(lane(D, i) > 0), 0)) failed_body_ = n;
+      if (__builtin_expect(!(lane(D, i) > 0), 0) && failed_body_ < 0) failed_body_ = n;
   }
 
   template <bool with_loads>
@@ -236,9 +237,11 @@ class ArticulatedBody {
       for (int j = 0; j <= i; ++j) {
         S d = dot(g.P[i], w.U[j]);
         if (i == j) d = d + armature[g.dof[i]];
+        const S whole = d;
         for (int l = 0; l < j; ++l) d = d - w.L[6 * i + l] * w.L[6 * j + l];
         if (i == j) {
-          check(d, n);
+          // Two columns that move the body alike leave rounding noise here, not zero.
+          check(S(d - smallest_pivot * whole), n);
           w.L[7 * i] = 1.0 / square_root(d);
         } else {
           w.L[6 * i + j] = d * w.L[7 * j];
