@@ -224,6 +224,25 @@ nb::list joint_axes(const PyModel& self) {
   return out;
 }
 
+ArrayOut link_centers_of_mass(const PyModel& self) {
+  const std::vector<LinkSpec>& links = self.model->spec().links;
+  NewArray out({links.size()}, {3});
+  double* row = out.data;
+  for (const LinkSpec& link : links)
+    for (double x : {link.com.x, link.com.y, link.com.z}) *row++ = x;
+  return out.array;
+}
+
+ArrayOut link_inertias(const PyModel& self) {
+  const std::vector<LinkSpec>& links = self.model->spec().links;
+  NewArray out({links.size()}, {3, 3});
+  double* row = out.data;
+  for (const LinkSpec& link : links)
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) *row++ = link.inertia.m[sym_index(i, j)];
+  return out.array;
+}
+
 }  // namespace
 
 void bind_model(nb::module_& m) {
@@ -336,6 +355,19 @@ void bind_model(nb::module_& m) {
             return out;
           },
           "Every link of the source, merged ones included.")
+      .def_prop_ro(
+          "link_masses",
+          [](const PyModel& s) {
+            std::vector<double> masses;
+            for (const LinkSpec& link : s.model->spec().links) masses.push_back(link.mass);
+            return to_numpy(masses);
+          },
+          nb::rv_policy::move, "Mass of each link (n_links,) in kg, in the order of link_names.")
+      .def_prop_ro("link_centers_of_mass", &link_centers_of_mass, nb::rv_policy::move,
+                   "Centre of mass of each link (n_links, 3) in m, in the link's frame.")
+      .def_prop_ro(
+          "link_inertias", &link_inertias, nb::rv_policy::move,
+          "Inertia of each link (n_links, 3, 3) in kg m2 about its centre of mass, link axes.")
       .def_prop_ro("joint_nq",
                    [](const PyModel& s) {
                      nb::list out;
@@ -380,7 +412,7 @@ void bind_model(nb::module_& m) {
               masses.push_back(j.last_of_body ? s.model->constants[j.body].inertia.m : 0);
             return to_numpy(masses);
           },
-          "Mass of each body (n_bodies,) in kg, with what was welded to it.")
+          nb::rv_policy::move, "Mass of each body (n_bodies,) in kg, with what was welded to it.")
       .def(
           "joint_index",
           [](const PyModel& s, const std::string& name) { return s.model->joint_index(name); },
@@ -431,6 +463,27 @@ void bind_model(nb::module_& m) {
                     "': " + std::to_string(s.model->n_joints()) + " joints, nq " +
                     std::to_string(s.model->nq()) + ", nv " + std::to_string(s.model->nv()) + ">";
            })
+      .def(
+          "to_bytes",
+          [](const PyModel& s, const nb::object& source) {
+            ModelSpec spec = s.model->spec();
+            if (!source.is_none()) spec.source = nb::cast<std::string>(source);
+            const std::string bytes = serialize(spec);
+            return nb::bytes(bytes.data(), bytes.size());
+          },
+          nb::kw_only(), "source"_a = nb::none(),
+          "The model's description, for from_bytes. source replaces Model.source in it, which may "
+          "be "
+          "a path.")
+      .def_static(
+          "from_bytes",
+          [](const nb::bytes& description) {
+            return new PyModel(deserialize(std::string(description.c_str(), description.size())));
+          },
+          "description"_a,
+          "The Model that to_bytes described. Runs no code, unlike pickle; InputError for bytes "
+          "that "
+          "are no model.")
       .def("__getstate__",
            [](const PyModel& s) {
              const std::string bytes = serialize(s.model->spec());
