@@ -76,9 +76,11 @@ void ScaledTree::set_structure(const BlockTree& A) {
   coupling.resize(count);
   levers.resize(A.levers.size());
   hubs.resize(A.hubs.size());
+  joints_on_a_body_ = 2;
   for (std::size_t h = 0; h < hubs.size(); ++h) {
     hubs[h].node = A.hubs[h].node;
     hubs[h].children = A.hubs[h].children;
+    joints_on_a_body_ = std::max(joints_on_a_body_, static_cast<int>(hubs[h].children.size()) + 1);
   }
   lower_.resize(count);
   roots_.resize(count);

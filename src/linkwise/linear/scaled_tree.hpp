@@ -32,6 +32,10 @@ class ScaledTree {
   int n() const { return static_cast<int>(parent.size()); }
   int size() const { return offset.empty() ? 0 : offset.back(); }
 
+  /// The largest number of joints on one body, at least 2: a bound on the eigenvalues of A~, by the
+  /// element bound of [wathen1987] (A and D are both sums over the bodies).
+  int joints_on_a_body() const { return joints_on_a_body_; }
+
   void scale_right_hand_side(std::span<const double> b, std::span<double> scaled) const;
   void scale_solution(std::span<const double> x, std::span<double> scaled) const;
   void unscale_solution(std::span<const double> scaled, std::span<double> x) const;
@@ -72,7 +76,7 @@ class ScaledTree {
 
   std::vector<PackedLower> lower_;            ///< unit L; the diagonal holds 1 / D
   std::vector<std::array<double, 6>> roots_;  ///< sqrt(1 / D)
-  int failed_node_ = -1;
+  int failed_node_ = -1, joints_on_a_body_ = 2;
   bool structure_changed_ = false;
 };
 

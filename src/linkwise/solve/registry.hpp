@@ -18,6 +18,7 @@ struct SolverEntry {
   std::string_view name;
   std::string_view description;
   SolverKind kind;
+  bool chains_only;            ///< InputError on trees that branch
   bool parallel;               ///< can all nodes work at once, up to sums and short recursions?
   std::string_view reference;  ///< key in references.bib
   std::unique_ptr<LinearSolver> (*make)(const SolverOptions&);

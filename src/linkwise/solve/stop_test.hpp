@@ -38,9 +38,16 @@ class StopTest {
 
   /// Counts an iteration; true when the solver has to stop, with outcome() telling why.
   bool stops(const IterationStep& step);
-  /// The solver stops on its own account.
-  void stop(Outcome outcome) { outcome_ = outcome; }
+  /// The solver stops on its own account; `converged` when there is nothing left to improve.
+  void stop(Outcome outcome) {
+    outcome_ = outcome;
+    if (outcome == Outcome::converged) squared_error_ = 0.0;
+  }
 
+  /// ||x*||_A^2 as far as it is known before the first iteration.
+  void set_solution_energy(double energy) {
+    if (!correcting_) solution_energy_ = energy;
+  }
   /// Lower bound of the spectrum of the preconditioned A as far as the iteration saw it.
   void set_smallest_eigenvalue(double value) {
     smallest_eigenvalue_ =
@@ -56,6 +63,8 @@ class StopTest {
   double solution_energy() const { return solution_energy_; }
   /// Estimate of ||e||_A / ||x*||_A.
   double relative_error() const;
+  /// Estimate of ||e||_A^2 when the iteration stopped.
+  double squared_error() const { return squared_error_; }
   const EnergyEstimate& estimate() const { return estimate_; }
 
  private:

@@ -58,6 +58,7 @@ double Chebyshev::calc_squared_error(double change_square) {
   last_changes_[2] = last_changes_[1];
   last_changes_[1] = last_changes_[0];
   last_changes_[0] = change_square;
+  if (change_square == 0.0) return 0.0;
   if (oldest == 0.0) return std::numeric_limits<double>::infinity();
   const double rate = std::max(contraction_, std::pow(change_square / oldest, 1.0 / 6.0));
   if (!(rate < 1.0)) return std::numeric_limits<double>::infinity();

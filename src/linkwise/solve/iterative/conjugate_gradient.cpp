@@ -44,6 +44,7 @@ void ConjugateGradient::three_term(std::span<const double> b, std::span<double> 
   multiply(x, z);
   subtract_from(b, z);
   const double known_energy = dot(x, b) + dot(x, z);
+  stop.set_solution_energy(known_energy);
   double zz = sum_of_squares(z), zz_previous = 0.0, gamma_previous = 0.0, rho = 1.0, share = 1.0;
   const double first_zz = zz;
   double step = 0.0;

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <limits>
 
+#include "linkwise/linear/residual.hpp"
 #include "linkwise/linear/vector.hpp"
 
 namespace linkwise {
@@ -35,7 +36,7 @@ Outcome IterativeSolver::prepare_all(const BlockTree& A) {
   failed_node_ = -1;
   if (coordinates_ == Coordinates::block_scaled && !scaled_.prepare(A)) {
     failed_node_ = scaled_.failed_node();
-    return A.all_finite() ? Outcome::not_positive_definite : Outcome::not_finite;
+    return Outcome::not_positive_definite;
   }
   const std::size_t size = static_cast<std::size_t>(A.size());
   for (std::vector<double>* v : {&b_, &x_, &residual_, &correction_}) v->resize(size);
@@ -60,6 +61,8 @@ Report IterativeSolver::solve(const BlockTree& A, std::span<const double> b, std
     report = run(A, b, x);
   else
     report.error_estimate = std::numeric_limits<double>::infinity();
+  if (report.outcome == Outcome::not_positive_definite && !A.all_finite())
+    report.outcome = Outcome::not_finite;
   report.node = failed_node_;
   finished(report);
   return report;
@@ -86,7 +89,8 @@ Report IterativeSolver::run(const BlockTree& A, std::span<const double> b, std::
 
   Report report{stop_.outcome(), stop_.iterations(), stop_.relative_error(), -1};
   if (!std::isfinite(sum_of_squares(x))) report.outcome = Outcome::not_finite;
-  if (report.ok() && options_.stop == StopRule::energy_norm && rounding_may_matter(x_))
+  const bool ended = report.ok() || report.outcome == Outcome::stagnated;
+  if (ended && options_.stop == StopRule::energy_norm && rounding_may_matter(x_))
     verify(b, x, report);
   report.iterations = stop_.iterations();
   return report;
@@ -101,34 +105,53 @@ bool IterativeSolver::rounding_may_matter(std::span<const double> x) const {
   return floor > 0.01 * stop_.energy_bound() * stop_.energy_bound();
 }
 
+/// Forms the residual of x, in iteration coordinates in b_, and bounds the squared error that left
+/// it.
+double IterativeSolver::bound_error(std::span<const double> b, std::span<const double> x,
+                                    bool accurate) {
+  if (accurate) {
+    accurate_residual(*system_, b, x, residual_);
+  } else {
+    system_->multiply(x, residual_);
+    subtract_from(b, residual_);
+  }
+  if (coordinates_ == Coordinates::block_scaled)
+    scaled_.scale_right_hand_side(residual_, b_);
+  else
+    std::copy(residual_.begin(), residual_.end(), b_.begin());
+  return std::max(0.0, preconditioned_square(b_)) / stop_.smallest_eigenvalue();
+}
+
 void IterativeSolver::verify(std::span<const double> b, std::span<double> x, Report& report) {
   const double bound = stop_.energy_bound();
   const double energy = stop_.solution_energy();
-  const bool is_scaled = coordinates_ == Coordinates::block_scaled;
+  const double scale = energy > 0.0 ? 1.0 / std::sqrt(energy) : 1.0;
   // A correction that takes longer than the solution did is lost in rounding.
-  const int limit = std::min(stop_.iterations_left(), stop_.iterations() + 10);
+  const int limit = stop_.iterations() + 10;
+  report.outcome = Outcome::converged;
+  if (bound_error(b, x, false) <= bound * bound) return;  // the iteration's own estimate stands
   double previous = std::numeric_limits<double>::infinity();
   while (true) {
-    system_->multiply(x, residual_);
-    subtract_from(b, residual_);
-    if (is_scaled)
-      scaled_.scale_right_hand_side(residual_, b_);
-    else
-      std::copy(residual_.begin(), residual_.end(), b_.begin());
-    const double left = std::max(0.0, preconditioned_square(b_)) / stop_.smallest_eigenvalue();
-    if (left <= bound * bound) return;  // the estimate of the iteration stands
+    const double square = bound_error(b, x, true);
+    if (square <= bound * bound) {
+      report.error_estimate = std::sqrt(square) * scale;
+      return;
+    }
     std::fill(x_.begin(), x_.end(), 0.0);
-    stop_.start_correction(energy, limit);
+    stop_.start_correction(energy, std::min(limit, stop_.iterations_left()));
     iterate(b_, x_, stop_);
-    const double measured = std::sqrt(std::max(0.0, dot(b_, x_)));
-    report.error_estimate = energy > 0.0 ? measured / std::sqrt(energy) : measured;
-    if (stop_.outcome() == Outcome::converged && measured <= bound) return;
-    if (stop_.outcome() != Outcome::converged || measured > 0.5 * previous) {
+    const bool complete = stop_.outcome() == Outcome::converged;
+    // What an unfinished correction still lacks is part of the error too.
+    const double missing = complete ? 0.0 : std::min(square, stop_.squared_error());
+    const double error = std::sqrt(std::max(0.0, dot(b_, x_)) + missing);
+    report.error_estimate = error * scale;
+    if (complete && error <= bound) return;
+    if (!complete || error > 0.5 * previous) {
       report.outcome = Outcome::stagnated;
       return;
     }
-    previous = measured;
-    if (is_scaled)
+    previous = error;
+    if (coordinates_ == Coordinates::block_scaled)
       scaled_.unscale_solution(x_, correction_);
     else
       std::copy(x_.begin(), x_.end(), correction_.begin());

@@ -49,6 +49,7 @@ class IterativeSolver : public LinearSolver {
   Report run(const BlockTree& A, std::span<const double> b, std::span<double> x);
   bool rounding_may_matter(std::span<const double> x) const;
   void verify(std::span<const double> b, std::span<double> x, Report& report);
+  double bound_error(std::span<const double> b, std::span<const double> x, bool accurate);
 
   Coordinates coordinates_;
   ScaledTree scaled_;

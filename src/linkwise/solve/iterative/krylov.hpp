@@ -64,17 +64,21 @@ struct KrylovVectors {
 
 /// multiply(v, w): w = A v. precondition(r, z): z = M^-1 r, or returns r itself for M = 1.
 /// other_energy: what the part of the solution that x leaves out adds to ||x*||_A^2.
+/// residual_is_known: work.r holds b - A x already.
 /// The bound on the error is (z, r)^2 / (p, M p) over the smallest eigenvalue [meurant2019].
 template <class Multiply, class Precondition>
 void conjugate_gradients(std::span<const double> b, std::span<double> x, StopTest& stop,
                          KrylovVectors& work, Multiply&& multiply, Precondition&& precondition,
-                         double other_energy = 0.0) {
+                         double other_energy = 0.0, bool residual_is_known = false) {
   work.resize(x.size());
   std::span<double> r = work.r, p = work.p, q = work.q;
-  multiply(std::span<const double>(x), r);
-  subtract_from(b, r);
+  if (!residual_is_known) {
+    multiply(std::span<const double>(x), r);
+    subtract_from(b, r);
+  }
   // ||x*||^2 - ||x* - x0||^2 = x0^T (b + r0)  [strakos2002, eq. (3.10)]
   const double known_energy = other_energy + dot(x, b) + dot(x, r);
+  stop.set_solution_energy(known_energy);
   std::span<const double> z = precondition(std::span<const double>(r), std::span<double>(work.z));
   double rz = dot(r, z), growth = 0.0;
   const double first_rz = rz;

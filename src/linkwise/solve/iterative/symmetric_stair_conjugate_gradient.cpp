@@ -9,8 +9,6 @@
 
 #include "linkwise/solve/iterative/symmetric_stair_conjugate_gradient.hpp"
 
-#include <algorithm>
-
 #include "linkwise/solve/iterative/iterative_solver.hpp"
 #include "linkwise/solve/iterative/krylov.hpp"
 
@@ -24,10 +22,7 @@ class SymmetricStairConjugateGradient final : public IterativeSolver {
 
  private:
   Outcome prepare(const BlockTree&) override {
-    std::size_t joints_on_a_body = 2;
-    for (const ScaledTree::Hub& body : scaled().hubs)
-      joints_on_a_body = std::max(joints_on_a_body, body.children.size() + 1);
-    shift_ = static_cast<double>(joints_on_a_body);
+    shift_ = scaled().joints_on_a_body();
     preconditioned_.resize(scaled().size());
     return Outcome::converged;
   }

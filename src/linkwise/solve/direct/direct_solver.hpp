@@ -1,0 +1,36 @@
+#pragma once
+// What the direct solvers share: factor once and solve for one or several right-hand sides, with
+// iterative refinement and the error estimate that comes with it.
+
+#include <span>
+#include <vector>
+
+#include "linkwise/solve/solver.hpp"
+
+namespace linkwise {
+
+class DirectSolver : public LinearSolver {
+ public:
+  Report solve(const BlockTree& A, std::span<const double> b, std::span<double> x) final;
+  Report solve_many(const BlockTree& A, int count, std::span<const double> b,
+                    std::span<double> x) final;
+
+  /// The two halves of solve(), for right-hand sides that become known later.
+  Report factor(const BlockTree& A);
+  Report solve_factored(const BlockTree& A, std::span<const double> b, std::span<double> x);
+
+ protected:
+  explicit DirectSolver(const SolverOptions& options) : LinearSolver(options) {}
+
+  /// Factors A; the node at which that fails, or -1.
+  virtual int factor_matrix(const BlockTree& A) = 0;
+  /// x <- A^-1 x by the factor.
+  virtual void solve_in_place(const BlockTree& A, std::span<double> x) = 0;
+
+ private:
+  Report refine(const BlockTree& A, std::span<const double> b, std::span<double> x);
+
+  std::vector<double> residual_, correction_;
+};
+
+}  // namespace linkwise

@@ -1,0 +1,304 @@
+#include "linkwise/solve/iterative/coarse_space.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "linkwise/linear/symmetric_eigen.hpp"
+
+namespace linkwise {
+namespace {
+
+/// Lower R with G = R R^T, n x n; false when G is not positive definite.
+bool cholesky(int n, const Block& g, Block& root) {
+  root.fill(0.0);
+  for (int j = 0; j < n; ++j)
+    for (int i = j; i < n; ++i) {
+      double sum = 0.5 * (g[6 * i + j] + g[6 * j + i]);
+      for (int k = 0; k < j; ++k) sum -= root[6 * i + k] * root[6 * j + k];
+      if (i == j && !(sum > 0.0)) return false;
+      root[6 * i + j] = i == j ? std::sqrt(sum) : sum / root[7 * j];
+    }
+  return true;
+}
+
+/// R^-T u, R lower: the force whose response has unit energy along u.
+std::array<double, 6> unit_force(int n, const Block& root, const std::array<double, 6>& u) {
+  std::array<double, 6> force = u;
+  for (int i = n - 1; i >= 0; --i) {
+    for (int k = i + 1; k < n; ++k) force[i] -= root[6 * k + i] * force[k];
+    force[i] /= root[7 * i];
+  }
+  return force;
+}
+
+}  // namespace
+
+void CoarseSpace::set_pieces(const BlockTree& A, std::span<const char> cut) {
+  pieces_.clear();
+  cuts_.clear();
+  piece_of_.assign(A.n(), -1);
+  local_.assign(A.n(), 0);
+  offset_ = A.offset;
+  for (int i = 0; i < A.n(); ++i) {
+    const int p = A.parent[i];
+    if (p < 0 || cut[i]) {
+      piece_of_[i] = static_cast<int>(pieces_.size());
+      pieces_.emplace_back().root = i;
+    } else {
+      piece_of_[i] = piece_of_[p];
+    }
+    Piece& piece = pieces_[piece_of_[i]];
+    local_[i] = piece.size;
+    piece.size += A.dim[i];
+    piece.nodes.push_back(i);
+    // A cut next to a node without rows couples nothing.
+    if (p < 0 || !cut[i] || A.dim[i] == 0 || A.dim[p] == 0) continue;
+    piece.parent = piece_of_[p];
+    piece.cut = static_cast<int>(cuts_.size());
+    pieces_[piece.parent].tails.push_back(piece.cut);
+    cuts_.push_back({piece_of_[i], i, piece.parent, p});
+  }
+  reserve();
+}
+
+/// Room for all directions of every cut, so that build() does not allocate.
+void CoarseSpace::reserve() {
+  std::size_t values = 0;
+  for (const Cut& cut : cuts_)
+    values +=
+        6 * static_cast<std::size_t>(pieces_[cut.piece].size + pieces_[cut.parent_piece].size);
+  values_.reserve(values);
+  columns_.reserve(12 * cuts_.size());
+  coarse_.reserve(12 * cuts_.size());
+  forced_.reserve(cuts_.size());
+  const auto most = [](const Piece& piece) {
+    return 6 * (piece.tails.size() + (piece.parent >= 0 ? 1 : 0));
+  };
+  for (Piece& piece : pieces_) {
+    piece.columns.reserve(most(piece));
+    piece.pivot.reserve(most(piece) * most(piece));
+    if (piece.parent >= 0) piece.inboard.reserve(most(piece) * most(pieces_[piece.parent]));
+  }
+}
+
+/// responses[k] = J^-1 e_k with a unit force in component k of each of the nodes, one a piece.
+void CoarseSpace::respond(const BlockTree& A, TreeFactor& pieces, std::span<const int> nodes,
+                          std::array<std::vector<double>, 6>& responses) {
+  for (int k = 0; k < 6; ++k) {
+    responses[k].assign(A.size(), 0.0);
+    bool any = false;
+    for (int i : nodes)
+      if (A.dim[i] > k) {
+        responses[k][A.offset[i] + k] = 1.0;
+        any = true;
+      }
+    if (any) pieces.solve_in_place(responses[k]);
+  }
+}
+
+void CoarseSpace::add_column(const BlockTree& A, int piece, int node,
+                             const std::array<double, 6>& force,
+                             const std::array<std::vector<double>, 6>& responses) {
+  const std::size_t begin = values_.size();
+  values_.resize(begin + pieces_[piece].size, 0.0);
+  for (int i : pieces_[piece].nodes) {
+    double* const to = values_.data() + begin + local_[i];
+    for (int k = 0; k < A.dim[node]; ++k)
+      for (int r = 0; r < A.dim[i]; ++r) to[r] += force[k] * responses[k][A.offset[i] + r];
+  }
+  pieces_[piece].columns.push_back(static_cast<int>(columns_.size()));
+  columns_.push_back({node, force, begin});
+}
+
+/// Adds the responses of both sides of a cut along the principal directions beyond the threshold.
+void CoarseSpace::select(const BlockTree& A, const Cut& cut, double threshold) {
+  const int rows = A.dim[cut.root], cols = A.dim[cut.tail];
+  Block inner{}, outer{}, root_factor, tail_factor, w{}, square{}, u;
+  for (int r = 0; r < rows; ++r)
+    for (int k = 0; k < rows; ++k) inner[6 * r + k] = root_responses_[k][A.offset[cut.root] + r];
+  for (int r = 0; r < cols; ++r)
+    for (int k = 0; k < cols; ++k) outer[6 * r + k] = tail_responses_[k][A.offset[cut.tail] + r];
+  if (!cholesky(rows, inner, root_factor) || !cholesky(cols, outer, tail_factor)) return;
+  const Block& coupling = A.parent_block[cut.root];
+  for (int r = 0; r < rows; ++r)
+    for (int k = 0; k < cols; ++k)
+      for (int a = r; a < rows; ++a)
+        for (int b = k; b < cols; ++b)
+          w[6 * r + k] += root_factor[6 * a + r] * coupling[6 * a + b] * tail_factor[6 * b + k];
+  for (int r = 0; r < rows; ++r)
+    for (int s = 0; s < rows; ++s)
+      for (int k = 0; k < cols; ++k) square[6 * r + s] += w[6 * r + k] * w[6 * s + k];
+  std::array<double, 6> squares{};
+  symmetric_eigen(rows, square, squares, u);
+  for (int q = 0; q < rows; ++q) {
+    if (!(squares[q] > threshold * threshold)) continue;
+    std::array<double, 6> left{}, right{};
+    for (int r = 0; r < rows; ++r) left[r] = u[6 * r + q];
+    for (int k = 0; k < cols; ++k)
+      for (int r = 0; r < rows; ++r) right[k] += w[6 * r + k] * left[r] / std::sqrt(squares[q]);
+    add_column(A, cut.piece, cut.root, unit_force(rows, root_factor, left), root_responses_);
+    add_column(A, cut.parent_piece, cut.tail, unit_force(cols, tail_factor, right),
+               tail_responses_);
+  }
+}
+
+void CoarseSpace::build(const BlockTree& A, TreeFactor& pieces, double threshold) {
+  columns_.clear();
+  values_.clear();
+  for (Piece& piece : pieces_) piece.columns.clear();
+  forced_.clear();
+  for (const Cut& cut : cuts_) forced_.push_back(cut.root);
+  respond(A, pieces, forced_, root_responses_);
+  // One tail of every piece at a time: forces in different pieces do not meet.
+  for (std::size_t round = 0;; ++round) {
+    forced_.clear();
+    for (const Piece& piece : pieces_)
+      if (piece.tails.size() > round) forced_.push_back(cuts_[piece.tails[round]].tail);
+    if (forced_.empty()) break;
+    respond(A, pieces, forced_, tail_responses_);
+    for (const Piece& piece : pieces_)
+      if (piece.tails.size() > round) select(A, cuts_[piece.tails[round]], threshold);
+  }
+  coarse_.resize(columns_.size());
+  factor(A);
+}
+
+/// E_jj, whose columns are responses J^-1 E f: row a of it is the force f_a on what the others do
+/// at its node; and E_jq over the cut towards the base.
+void CoarseSpace::assemble(const BlockTree& A, Piece& piece) {
+  const std::size_t m = piece.columns.size();
+  piece.pivot.assign(m * m, 0.0);
+  for (std::size_t a = 0; a < m; ++a) {
+    const Column& column = columns_[piece.columns[a]];
+    for (std::size_t b = 0; b < m; ++b) {
+      const double* const at = value(piece.columns[b], column.node);
+      for (int k = 0; k < A.dim[column.node]; ++k)
+        piece.pivot[m * a + b] += column.force[k] * at[k];
+    }
+  }
+  if (piece.parent < 0) return;
+  const Cut& cut = cuts_[piece.cut];
+  const std::vector<int>& others = pieces_[piece.parent].columns;
+  piece.inboard.assign(m * others.size(), 0.0);
+  for (std::size_t a = 0; a < m; ++a) {
+    double force[6] = {};  // on the tail by this column
+    block_transpose_multiply_add(A.dim[cut.root], A.dim[cut.tail], A.parent_block[cut.root],
+                                 value(piece.columns[a], cut.root), force);
+    for (std::size_t b = 0; b < others.size(); ++b) {
+      const double* const at = value(others[b], cut.tail);
+      for (int k = 0; k < A.dim[cut.tail]; ++k)
+        piece.inboard[others.size() * a + b] += force[k] * at[k];
+    }
+  }
+}
+
+/// Block L D L^T of the coarse matrix along the tree of pieces. The columns have unit energy, so a
+/// pivot at rounding level belongs to a column that the others span already: it is left out.
+void CoarseSpace::factor(const BlockTree& A) {
+  constexpr double dependent = 1e-13;
+  for (Piece& piece : pieces_) assemble(A, piece);
+  for (auto it = pieces_.rbegin(); it != pieces_.rend(); ++it) {
+    Piece& piece = *it;
+    const std::size_t m = piece.columns.size();
+    double* const l = piece.pivot.data();
+    for (std::size_t j = 0; j < m; ++j) {
+      const double inverse = l[m * j + j] > dependent ? 1.0 / l[m * j + j] : 0.0;
+      for (std::size_t i = j + 1; i < m; ++i)
+        for (std::size_t k = j + 1; k <= i; ++k)
+          l[m * i + k] -= l[m * i + j] * l[m * k + j] * inverse;
+      for (std::size_t i = j + 1; i < m; ++i) l[m * i + j] *= inverse;
+      l[m * j + j] = inverse;
+    }
+    if (piece.parent < 0) continue;
+    Piece& into = pieces_[piece.parent];
+    const std::size_t cols = into.columns.size();
+    double* const e = piece.inboard.data();
+    for (std::size_t i = 1; i < m; ++i)
+      for (std::size_t j = 0; j < i; ++j)
+        for (std::size_t k = 0; k < cols; ++k) e[cols * i + k] -= l[m * i + j] * e[cols * j + k];
+    for (std::size_t i = 0; i < m; ++i)
+      for (std::size_t r = 0; r < cols; ++r)
+        for (std::size_t k = 0; k < cols; ++k)
+          into.pivot[cols * r + k] -= e[cols * i + r] * l[m * i + i] * e[cols * i + k];
+  }
+}
+
+void CoarseSpace::restrict_all(std::span<const double> r) {
+  for (const Piece& piece : pieces_)
+    for (int column : piece.columns) {
+      double sum = 0.0;
+      const double* from = values_.data() + columns_[column].begin;
+      for (int i : piece.nodes) {
+        const int at = offset_[i], dim = offset_[i + 1] - at;
+        for (int k = 0; k < dim; ++k) sum += *from++ * r[at + k];
+      }
+      coarse_[column] = sum;
+    }
+}
+
+void CoarseSpace::restrict_cuts(const BlockTree& A, std::span<const double> z) {
+  std::fill(coarse_.begin(), coarse_.end(), 0.0);
+  for (const Cut& cut : cuts_) {
+    const int rows = A.dim[cut.root], cols = A.dim[cut.tail];
+    double on_root[6] = {}, on_tail[6] = {};
+    const Block& coupling = A.parent_block[cut.root];
+    block_multiply_add(rows, cols, coupling, z.data() + A.offset[cut.tail], on_root, -1.0);
+    block_transpose_multiply_add(rows, cols, coupling, z.data() + A.offset[cut.root], on_tail,
+                                 -1.0);
+    for (int column : pieces_[cut.piece].columns)
+      for (int k = 0; k < rows; ++k) coarse_[column] += value(column, cut.root)[k] * on_root[k];
+    for (int column : pieces_[cut.parent_piece].columns)
+      for (int k = 0; k < cols; ++k) coarse_[column] += value(column, cut.tail)[k] * on_tail[k];
+  }
+}
+
+double CoarseSpace::solve() {
+  double energy = 0.0;
+  for (auto it = pieces_.rbegin(); it != pieces_.rend(); ++it) {
+    const std::vector<int>& own = it->columns;
+    const std::size_t m = own.size();
+    for (std::size_t i = 1; i < m; ++i)
+      for (std::size_t j = 0; j < i; ++j) coarse_[own[i]] -= it->pivot[m * i + j] * coarse_[own[j]];
+    for (std::size_t i = 0; i < m; ++i) {
+      const double scaled = coarse_[own[i]] * it->pivot[m * i + i];
+      energy += coarse_[own[i]] * scaled;
+      coarse_[own[i]] = scaled;
+    }
+    if (it->parent < 0) continue;
+    const std::vector<int>& others = pieces_[it->parent].columns;
+    for (std::size_t i = 0; i < m; ++i)
+      for (std::size_t k = 0; k < others.size(); ++k)
+        coarse_[others[k]] -= it->inboard[others.size() * i + k] * coarse_[own[i]];
+  }
+  for (Piece& piece : pieces_) {
+    const std::vector<int>& own = piece.columns;
+    const std::size_t m = own.size();
+    if (piece.parent >= 0) {
+      const std::vector<int>& others = pieces_[piece.parent].columns;
+      for (std::size_t i = 0; i < m; ++i) {
+        double sum = 0.0;
+        for (std::size_t k = 0; k < others.size(); ++k)
+          sum += piece.inboard[others.size() * i + k] * coarse_[others[k]];
+        coarse_[own[i]] -= piece.pivot[m * i + i] * sum;
+      }
+    }
+    for (std::size_t i = m; i-- > 1;)
+      for (std::size_t j = 0; j < i; ++j)
+        coarse_[own[j]] -= piece.pivot[m * i + j] * coarse_[own[i]];
+  }
+  return energy;
+}
+
+void CoarseSpace::prolong_add(std::span<double> x) const {
+  for (const Piece& piece : pieces_)
+    for (int column : piece.columns) {
+      const double factor = coarse_[column];
+      const double* from = values_.data() + columns_[column].begin;
+      for (int i : piece.nodes) {
+        const int at = offset_[i], dim = offset_[i + 1] - at;
+        for (int k = 0; k < dim; ++k) x[at + k] += factor * *from++;
+      }
+    }
+}
+
+}  // namespace linkwise
