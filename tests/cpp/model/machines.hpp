@@ -4,6 +4,8 @@
 // massless, floating).
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <ostream>
 #include <set>
 #include <string>
@@ -86,12 +88,49 @@ struct Machine {
 };
 inline void PrintTo(const Machine& machine, std::ostream* out) { *out << machine.name; }
 
+/// Hinges on axes that are parallel, nearly parallel, coincident, or meet in a point: the common
+/// normals that frames are put on are degenerate or far away. Two children on every second body.
+inline std::vector<Machine> axis_geometries(Draws& draws) {
+  struct Geometry {
+    const char* name;
+    double tilt;          ///< of each axis against the one before, about x, rad
+    Vec3<double> offset;  ///< of each joint from the one before
+  };
+  const Geometry geometries[] = {
+      {"parallel_planar", 0, {0.7, 0, 0}},
+      {"parallel_stepped", 0, {0.3, -0.2, 0.5}},
+      {"coincident", 0, {0, 0, 0.4}},
+      {"at_one_point", 0.8, {0, 0, 0}},
+      {"crossing", std::numbers::pi / 2, {0, 0, 0.6}},
+      {"antiparallel", std::numbers::pi, {0.5, 0, 0.1}},
+      {"nearly_parallel_1e-13", 1e-13, {0.5, 0.3, 0}},
+      {"nearly_parallel_1e-9", 1e-9, {0.5, 0.3, 0.2}},
+      {"nearly_parallel_1e-3", 1e-3, {0.5, 0.3, 0}},
+      {"nearly_parallel_0.1", 0.1, {0.5, 0.3, 0.2}},
+  };
+  std::vector<Machine> all;
+  for (const Geometry& g : geometries) {
+    ModelSpec spec = tree_spec(std::vector(7, JointType::revolute), {-1, 0, 1, 1, 2, 4, 4}, draws);
+    for (JointSpec& j : spec.joints) {
+      const double c = std::cos(g.tilt), s = std::sin(g.tilt);
+      j.rotation = {{1, 0, 0, 0, c, -s, 0, s, c}};
+      j.translation = g.offset;
+      j.axes[0].axis = {0, 0, 1};
+    }
+    std::string name = g.name;
+    for (char& letter : name)
+      if (letter == '.' || letter == '-') letter = '_';
+    all.push_back({name, spec});
+  }
+  return all;
+}
+
 /// Two or three massless links in a row between bodies, at most 6 degrees of freedom a stack; a
 /// side branch on the body in the middle.
 inline ModelSpec stacked_spec(Draws& draws) {
   using enum JointType;
   ModelSpec spec =
-      tree_spec({revolute, prismatic, helical, universal, spherical, fixed, planar, revolute},
+      tree_spec({revolute, prismatic, helical, universal, spherical, fixed, composite, revolute},
                 {-1, 0, 1, 2, 3, 4, 5, 3}, draws);
   for (int massless : {1, 2, 5, 6}) make_massless(spec.links[massless]);
   return spec;
@@ -193,6 +232,7 @@ inline std::vector<Machine> all_machines() {
     all.push_back({floating ? "hub_50_floating" : "hub_50", spec});
   }
   Draws draws(seed++);
+  for (Machine& machine : axis_geometries(draws)) all.push_back(std::move(machine));
   for (Machine& machine : special_machines(draws)) all.push_back(std::move(machine));
   return all;
 }

@@ -1,0 +1,124 @@
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "dynamics/dynamics_case.hpp"
+#include "linkwise/dynamics/composite_rigid_body.hpp"
+#include "linkwise/dynamics/quantities.hpp"
+
+namespace linkwise::testing {
+namespace {
+
+class Quantities : public ::testing::TestWithParam<Machine> {
+ protected:
+  Quantities() {
+    Draws draws(31);
+    state = random_state(model, draws);
+    motions = twin.motions(state.q, state.v);
+  }
+  Model model{GetParam().spec};
+  WorldTwin twin{model};
+  MachineState state;
+  WorldTwin::Motions<double> motions;
+};
+
+std::vector<double> flat(const Pose<double>& pose) {
+  const auto& [R, p] = pose;
+  return {R.m[0], R.m[1], R.m[2], p.x, R.m[3], R.m[4], R.m[5], p.y,
+          R.m[6], R.m[7], R.m[8], p.z, 0,      0,      0,      1};
+}
+
+TEST_P(Quantities, PosesAreTheTwins) {
+  std::vector<double> joints(16 * model.n_joints()), links(16 * model.links.size());
+  body_poses(model, state.q.data(), joints.data());
+  link_poses(model, state.q.data(), links.data());
+  const auto part = [](const std::vector<double>& all, size_t i) {
+    return std::vector<double>(all.begin() + 16 * i, all.begin() + 16 * (i + 1));
+  };
+  for (int j = 0; j < model.n_joints(); ++j)
+    expect_close(part(joints, j), flat(motions.pose[model.joints[j].link]), 1e-13,
+                 "pose at " + model.joints[j].name);
+  for (size_t l = 0; l < model.links.size(); ++l)
+    expect_close(part(links, l), flat(motions.pose[l]), 1e-13, "pose of " + model.links[l].name);
+}
+
+TEST_P(Quantities, JacobiansGiveTheTwinsVelocities) {
+  const size_t nv = model.nv();
+  std::vector<double> J(6 * nv);
+  for (int j = 0; j < model.n_joints(); ++j) {
+    body_jacobian(model, state.q.data(), j, J.data());
+    std::vector<double> got(6), want;
+    for (size_t r = 0; r < 6; ++r)
+      for (size_t k = 0; k < nv; ++k) got[r] += J[r * nv + k] * state.v[k];
+    const Pose<double>& at = motions.pose[model.joints[j].link];
+    const Screw<double>& v = motions.velocity[model.joints[j].link];
+    for (const Vec3<double>& part :
+         {transpose_times(at.R, v.s + cross(v.w, at.p)), transpose_times(at.R, v.w)})
+      want.insert(want.end(), {part.x, part.y, part.z});
+    expect_close(got, want, 1e-13, "velocity of " + model.joints[j].name);
+  }
+}
+
+TEST_P(Quantities, EnergiesAndMomentaAreSumsOverTheLinks) {
+  const ModelSpec& spec = model.spec();
+  double kinetic = 0, potential = 0, mass = 0;
+  Vec3<double> p, L;
+  for (size_t l = 0; l < spec.links.size(); ++l) {
+    if (model.links[l].joint < 0) continue;  // welded to the ground
+    const LinkSpec& link = spec.links[l];
+    const Pose<double>& at = motions.pose[l];
+    const Vec3<double> w = motions.velocity[l].w, c = at.p + at.R * link.com;
+    const Vec3<double> v = motions.velocity[l].s + cross(w, c);
+    const Vec3<double> spin = at.R * (link.inertia * transpose_times(at.R, w));
+    kinetic += link.mass * dot(v, v) / 2 + dot(w, spin) / 2;
+    potential -= link.mass * dot(spec.gravity, c);
+    mass += link.mass;
+    p += link.mass * v;
+    L += spin + cross(c, link.mass * v);
+  }
+  for (int i = 0; i < model.nv(); ++i)
+    kinetic += model.dof_values(DofProperty::armature)[i] * state.v[i] * state.v[i] / 2;
+  std::vector<double> h(6);
+  momentum(model, state.q.data(), state.v.data(), h.data());
+  expect_close(h, {p.x, p.y, p.z, L.x, L.y, L.z}, 1e-13, "momentum");
+  EXPECT_NEAR(kinetic_energy(model, state.q.data(), state.v.data()), kinetic,
+              1e-13 * (1 + kinetic));
+  EXPECT_NEAR(potential_energy(model, state.q.data()), potential,
+              1e-12 * (1 + std::abs(potential)));
+  EXPECT_NEAR(model.total_mass(), mass, 1e-13 * (1 + mass));
+}
+
+INSTANTIATE_TEST_SUITE_P(Machines, Quantities, ::testing::ValuesIn(all_machines()),
+                         [](const auto& test) { return test.param.name; });
+
+// Frames turn about exactly the axis that was given, whatever it is, and are the user's frames
+// at zero.
+TEST(Axes, OfEveryDirectionAreTurnedAbout) {
+  const Vec3<double> axes[] = {{1, 0, 0},          {-1, 0, 0},         {0, 1, 0},    {0, -1, 0},
+                               {0, 0, 1},          {0, 0, -1},         {1e-9, 0, 1}, {1e-9, 0, -1},
+                               {0, -1e-200, -1},   {1, 1, 1e-17},      {3, -4, 0},   {-3, 4, -12},
+                               {1e150, 0, -1e150}, {1e-150, 1e-150, 0}};
+  Draws draws(32);
+  for (const Vec3<double>& axis : axes) {
+    ModelSpec spec = tree_spec({JointType::revolute, JointType::helical}, chain_parents(2), draws);
+    for (JointSpec& j : spec.joints) j.axes[0].axis = axis;
+    const Model model(spec);
+    const WorldTwin twin(model);
+    for (const std::vector<double>& q : {std::vector<double>{0, 0}, {1.2, -0.7}}) {
+      std::vector<double> poses(32);
+      body_poses(model, q.data(), poses.data());
+      const auto want = twin.motions(q, std::vector<double>(2));
+      for (int j = 0; j < 2; ++j) {
+        const std::vector<double> pose(poses.begin() + 16 * j, poses.begin() + 16 * (j + 1));
+        expect_close(pose, flat(want.pose[j + 1]), 1e-14, "pose");
+        for (int i = 0; i < 16 && q[0] == 0 && j == 0; ++i)
+          if (i % 4 < 3 && i < 12) {
+            EXPECT_NEAR(pose[i], spec.joints[0].rotation.m[3 * (i / 4) + i % 4], 1e-15);
+          }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace linkwise::testing
