@@ -81,13 +81,14 @@ class ArticulatedBody {
 
   void calc_velocities(const SweepInput<S>& in) {
     const Model& model = *model_;
+    const Motion<S> resting{};
     for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];
         const BodyConstants<double>& k = model.constants[n];
         BodyWork& w = body_[n];
-        const Motion<S> v_parent = body.parent >= 0 ? body_[body.parent].v : Motion<S>{};
+        const Motion<S>& v_parent = body.parent >= 0 ? body_[body.parent].v : resting;
         if constexpr (is_general<J>) {
           BodyState<S> state;
           calc_general_state(model, body, in, v_parent, state, general_[body.general]);
@@ -282,7 +283,7 @@ class ArticulatedBody {
         const BodyTopology& body = model.topology[n];
         const BodyConstants<double>& k = model.constants[n];
         BodyWork& w = body_[n];
-        const Motion<S> a_parent = body.parent >= 0 ? body_[body.parent].v : ground;
+        const Motion<S>& a_parent = body.parent >= 0 ? body_[body.parent].v : ground;
         if constexpr (is_general<J>) {
           Motion<S> a = pose_[n] * a_parent;
           if constexpr (with_loads) w.U = load(n, a);

@@ -112,12 +112,16 @@ void CompositeRigidBody::mass_matrix(const double* q, double* H) {
       H[dof_[i] * nv + dof_[j]] = H[dof_[j] * nv + dof_[i]] = H_[i * n_dof + j];
 }
 
+constexpr double smallest_pivot = 1e-13;  // of the diagonal entry: below, rounding noise
+
 /// H = L^T L in place, from the tips down; returns false at a pivot that is not positive.
 bool CompositeRigidBody::factor() {
   const int n_dof = static_cast<int>(dof_.size());
+  std::vector<double> whole(n_dof);
+  for (int k = 0; k < n_dof; ++k) whole[k] = H_[static_cast<size_t>(k) * n_dof + k];
   for (int k = n_dof - 1; k >= 0; --k) {
     double* row = &H_[static_cast<size_t>(k) * n_dof];
-    if (!(row[k] > 0)) {
+    if (!(row[k] > smallest_pivot * whole[k])) {
       for (int n = 0; n < model_->n_bodies(); ++n)
         if (first_[n] <= k) failed_body_ = n;
       return false;

@@ -37,14 +37,12 @@ DynamicsReport ConstraintForce::correct(const SweepInput<double>& in, double* du
   rest.q = in.q;
   rest.tau = missing_.data();
   rest.gravity_factor = 0;
-  if (loads) dloads_.resize(6 * model_->n_joints());
   system_.assemble(rest);
   const DynamicsReport report{solver_->solve(system_.A(), system_.b(), df_)};
-  system_.recover(rest, df_, ddu_.data(), loads ? dloads_.data() : nullptr);
+  system_.recover(rest, df_, ddu_.data(), nullptr);
   for (size_t i = 0; i < nv; ++i) du[i] += ddu_[i];
   for (size_t i = 0; i < f_.size(); ++i) f_[i] += df_[i];
-  if (loads)
-    for (size_t i = 0; i < dloads_.size(); ++i) loads[i] += dloads_[i];
+  if (loads) inverse_->evaluate(in, du, nullptr, loads);
   return report;
 }
 

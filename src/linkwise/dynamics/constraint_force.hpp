@@ -20,14 +20,14 @@ class ConstraintForce : public DynamicsMethod {
   /// Where a light body carries a heavy one, A holds the heavy one's compliance in its last digits
   /// only: the forces come out right, their differences, the accelerations, do not. The torque that
   /// the accelerations miss (Newton-Euler, which does not suffer) gives their correction through the
-  /// same A.
+  /// same A, and the loads follow from the corrected motion.
   DynamicsReport correct(const SweepInput<double>& in, double* du, double* loads);
 
   const Model* model_;
   TreeSystem system_;
   std::unique_ptr<LinearSolver> solver_;
   std::unique_ptr<InitialGuess> guess_;
-  std::vector<double> f_, df_, missing_, ddu_, dloads_;
+  std::vector<double> f_, df_, missing_, ddu_;
   std::unique_ptr<InverseDynamics<double>> inverse_;  ///< made for the first correction
   bool direct_;
 };

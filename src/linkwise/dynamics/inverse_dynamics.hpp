@@ -47,7 +47,8 @@ class InverseDynamics {
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];
         const BodyConstants<double>& k = model.constants[n];
-        Motion<S> a = state_[n].X * (body.parent >= 0 ? a_[body.parent] : ground);
+        const Motion<S>& a_parent = body.parent >= 0 ? a_[body.parent] : ground;
+        Motion<S> a = state_[n].X * a_parent;
         a += state_[n].c;
         if constexpr (is_general<J>) {
           const GeneralState<S>& g = general_[body.general];

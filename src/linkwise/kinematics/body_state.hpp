@@ -113,13 +113,16 @@ LW_INLINE Force<S> user_wrench(const S* external, const JointInfo& joint, int in
 template <class S>
 void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states,
                       GeneralState<S>* general) {
+  const Motion<S> resting{};
   for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
     using J = decltype(joint);
     for (int n = begin; n < end; ++n) {
       const BodyTopology& body = model.topology[n];
       const BodyConstants<double>& k = model.constants[n];
       BodyState<S>& s = states[n];
-      const Motion<S> v_parent = body.parent >= 0 ? states[body.parent].v : Motion<S>{};
+      // By reference: a copy would be loaded in wide words that the narrow stores just before it
+      // cannot be forwarded to, a stall of a dozen cycles a body.
+      const Motion<S>& v_parent = body.parent >= 0 ? states[body.parent].v : resting;
       if constexpr (is_general<J>) {
         calc_general_state(model, body, in, v_parent, s, general[body.general]);
       } else {

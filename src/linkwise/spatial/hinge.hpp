@@ -30,24 +30,22 @@ LW_INLINE void turn(const A& c, const A& s, B& x, B& y) {
   x = turned;
 }
 
-/// Both sides of a 2x2 block turned: with t = c (xx - yy) - s (xy + yx) the diagonal changes by c t
-/// about the other entry and both off-diagonal entries by s t.
+/// Both sides of a 2x2 block turned. Written out: the shorter form that adds c t and s t to the
+/// entries cancels digits of the small one where inertias along and across differ by orders.
 template <class A, class B>
 LW_INLINE void turn_block(const A& c, const A& s, B& xx, B& xy, B& yx, B& yy) {
-  const B t = c * (xx - yy) - s * (xy + yx);
-  const B other = xx;
-  xx = yy + c * t;
-  yy = other - c * t;
-  xy += s * t;
-  yx += s * t;
+  turn(c, s, xx, yx);
+  turn(c, s, xy, yy);
+  turn(c, s, xx, xy);
+  turn(c, s, yx, yy);
 }
 template <class A, class B>
 LW_INLINE void turn_block(const A& c, const A& s, B& xx, B& xy, B& yy) {
-  const B t = c * (xx - yy) - s * (xy + xy);
-  const B other = xx;
-  xx = yy + c * t;
-  yy = other - c * t;
-  xy += s * t;
+  const B p = c * xx - s * xy, q = c * xy - s * yy;
+  const B r = s * xx + c * xy, u = s * xy + c * yy;
+  xx = c * p - s * q;
+  xy = s * p + c * q;
+  yy = s * r + c * u;
 }
 
 /// X v.
