@@ -42,7 +42,7 @@ THIRD_PARTIES = {
     r"mpi\.h": "src/linkwise/exec/mpi",
     r"(cuda|cub/|cooperative_groups|thrust/|nccl)": "src/linkwise/exec/cuda",
     r"(gtest|gmock)/": "tests/cpp",
-    r"(benchmark|pinocchio)/": "benchmarks",
+    r"(benchmark|pinocchio|mujoco)/": "benchmarks",
 }
 #: Headers of the compiler and of POSIX, which any layer may include.
 SYSTEM = re.compile(
