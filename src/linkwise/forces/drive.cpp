@@ -1,5 +1,7 @@
 #include "linkwise/forces/drive.hpp"
 
+#include "linkwise/forces/coordinate_forces.hpp"
+
 namespace linkwise {
 
 void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t,
@@ -8,19 +10,29 @@ void add_drive_torques(const Model& model, const std::vector<Drive>& drives, dou
     const Drive& drive = drives[j];
     if (drive.kind == DriveKind::free || drive.kind == DriveKind::locked) continue;
     const JointInfo& joint = model.joints[j];
-    double values[6], rates[6] = {};
+    double values[6], target_rates[6] = {};
     if (drive.table) {
       drive.table->evaluate(t, values);
-      if (drive.kind == DriveKind::pd) drive.table->evaluate(t, rates, 1);
+      if (drive.kind == DriveKind::pd) drive.table->evaluate(t, target_rates, 1);
     } else if (drive.callable) {
       drive.callable(t, q + joint.q, v + joint.v, values);
     } else {
       for (int i = 0; i < joint.nv; ++i) values[i] = drive.value[i];
     }
-    for (int i = 0; i < joint.nv; ++i)
-      tau[joint.v + i] += drive.kind == DriveKind::pd ? drive.kp * (values[i] - q[joint.q + i]) +
-                                                            drive.kd * (rates[i] - v[joint.v + i])
-                                                      : values[i];
+    if (drive.kind != DriveKind::pd) {
+      for (int i = 0; i < joint.nv; ++i) tau[joint.v + i] += values[i];
+      continue;
+    }
+    for (int i = joint.first_element; i < joint.first_element + joint.n_elements; ++i) {
+      const Element& e = model.elements[i];
+      double rate[3], force[3];
+      scalar_rates(e, q, v, rate);
+      for (int k = 0; k < e.nv; ++k) {
+        const int own = e.v - joint.v + k;
+        force[k] = drive.kp * (values[own] - q[e.q + k]) + drive.kd * (target_rates[own] - rate[k]);
+      }
+      add_coordinate_forces(e, q, force, tau);
+    }
   }
 }
 

@@ -29,8 +29,8 @@ struct Wrench {
 };
 
 /// One drive a joint; adds their torques to tau [nv]. A locked joint gets none: its motion is
-/// given. pd: kp (target - q) + kd (dtarget/dt - v), for joints whose coordinates are angles and
-/// distances.
+/// given. pd: kp (target - q) + kd (dtarget/dt - dq/dt) along the coordinates, for joints whose
+/// coordinates are angles and distances.
 void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t,
                        const double* q, const double* v, double* tau);
 

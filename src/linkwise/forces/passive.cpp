@@ -3,20 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linkwise/forces/coordinate_forces.hpp"
+
 namespace linkwise {
-namespace {
-
-/// Calls f(q index, v index) for every degree of freedom that is an angle or a distance of its own.
-template <class F>
-void for_scalar_dofs(const Model& model, F&& f) {
-  for (const Element& e : model.elements) {
-    if (e.nq == 1) f(e.q, e.v);
-    if (e.kind == ElementKind::planar)
-      for (int k = 0; k < 3; ++k) f(e.q + k, e.v + k);
-  }
-}
-
-}  // namespace
 
 void add_passive_forces(const Model& model, const double* q, const double* v, double* tau) {
   if (!model.has_passive_forces()) return;
@@ -33,28 +22,36 @@ void add_passive_forces(const Model& model, const double* q, const double* v, do
     tau[i] -= damping[i] * v[i];
     if (friction[i] > 0) tau[i] -= friction[i] * std::tanh(v[i] / friction_velocity[i]);
   }
-  for_scalar_dofs(model, [&](int iq, int iv) {
-    tau[iv] -= stiffness[iv] * (q[iq] - rest[iv]);
-    if (!(stop[iv] > 0)) return;
-    if (q[iq] > upper[iv])
-      tau[iv] -= stop[iv] * (q[iq] - upper[iv]) * std::max(0.0, 1 + stop_damping[iv] * v[iv]);
-    if (q[iq] < lower[iv])
-      tau[iv] += stop[iv] * (lower[iv] - q[iq]) * std::max(0.0, 1 - stop_damping[iv] * v[iv]);
-  });
+  for (const Element& e : model.elements) {
+    if (!has_scalar_coordinates(e)) continue;
+    double rate[3], force[3];
+    scalar_rates(e, q, v, rate);
+    for (int k = 0; k < e.nv; ++k) {
+      const int i = e.v + k;
+      const double x = q[e.q + k];
+      force[k] = -stiffness[i] * (x - rest[i]);
+      if (!(stop[i] > 0)) continue;
+      if (x > upper[i])
+        force[k] -= stop[i] * (x - upper[i]) * std::max(0.0, 1 + stop_damping[i] * rate[k]);
+      if (x < lower[i])
+        force[k] += stop[i] * (lower[i] - x) * std::max(0.0, 1 - stop_damping[i] * rate[k]);
+    }
+    add_coordinate_forces(e, q, force, tau);
+  }
 }
 
 double passive_potential(const Model& model, const double* q) {
   if (!model.has_passive_forces()) return 0;
   double energy = 0;
-  for_scalar_dofs(model, [&](int iq, int iv) {
-    const auto at = [&](DofProperty p) { return model.dof_values(p)[iv]; };
-    const double x = q[iq] - at(DofProperty::rest_position);
-    energy += 0.5 * at(DofProperty::stiffness) * x * x;
-    if (!(at(DofProperty::limit_stiffness) > 0)) return;
-    const double depth =
-        std::max({0.0, q[iq] - at(DofProperty::upper), at(DofProperty::lower) - q[iq]});
-    energy += 0.5 * at(DofProperty::limit_stiffness) * depth * depth;
-  });
+  for (const Element& e : model.elements)
+    for (int k = 0; has_scalar_coordinates(e) && k < e.nv; ++k) {
+      const auto at = [&](DofProperty p) { return model.dof_values(p)[e.v + k]; };
+      const double x = q[e.q + k], stretch = x - at(DofProperty::rest_position);
+      energy += 0.5 * at(DofProperty::stiffness) * stretch * stretch;
+      if (!(at(DofProperty::limit_stiffness) > 0)) continue;
+      const double depth = std::max({0.0, x - at(DofProperty::upper), at(DofProperty::lower) - x});
+      energy += 0.5 * at(DofProperty::limit_stiffness) * depth * depth;
+    }
   return energy;
 }
 
