@@ -12,6 +12,7 @@ from linkwise.cli.demo import demo
 from linkwise.cli.inspect import inspect
 from linkwise.cli.output import DONE, FAILED, WRONG_INPUT, print_json, say
 from linkwise.cli.run import run
+from linkwise.cli.view import view
 
 app = typer.Typer(
     name="linkwise",
@@ -25,6 +26,7 @@ app = typer.Typer(
 app.command()(demo)
 app.command()(inspect)
 app.command()(run)
+app.command()(view)
 
 # Typer re-exports BadParameter, a UsageError, which is a ClickException: the class of every
 # complaint about the command line, wherever this version of Typer keeps it.

@@ -1,0 +1,57 @@
+"""Joint loads as instances of an arrow and of an arc, sized and coloured by magnitude."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise.view.shapes import Array, turning_z_to
+
+# From small to large; the lightness falls evenly, so that the order survives a grey print.
+_STOPS = np.array(
+    [[120, 180, 230], [40, 130, 210], [70, 70, 190], [150, 20, 120], [170, 0, 20]], dtype=float
+)
+_NOTHING = 1e-9  # of a size: three.js cannot invert a transform of scale 0
+
+
+class Instances(NamedTuple):
+    """Positions (n, 3), quaternions (n, 4), scales (n,) and colours (n, 3) of one mesh."""
+
+    positions: Array
+    quaternions: Array
+    scales: Array
+    colors: npt.NDArray[np.uint8]
+
+
+def colors_of(share: Array) -> npt.NDArray[np.uint8]:
+    """Colours (n, 3) of magnitudes given as shares of the largest."""
+    at = np.clip(np.nan_to_num(share), 0.0, 1.0) * (len(_STOPS) - 1)
+    low = np.minimum(at.astype(int), len(_STOPS) - 2)
+    mixed = _STOPS[low] + (at - low)[:, None] * (_STOPS[low + 1] - _STOPS[low])
+    return np.asarray(np.rint(mixed), dtype=np.uint8)
+
+
+def color_bar() -> str:
+    """The colours as a CSS gradient, small ones left."""
+    stops = ", ".join(f"rgb({r:.0f}, {g:.0f}, {b:.0f})" for r, g, b in _STOPS)
+    return f"linear-gradient(90deg, {stops})"
+
+
+def in_world(frames: Array, loads: Array) -> tuple[Array, Array]:
+    """Forces and moments (n, 3) along the world's axes of loads (n, 6) along those of `frames`."""
+    halves = loads.reshape(-1, 2, 3)
+    turned = np.einsum("nij,nkj->nki", frames[:, :3, :3], halves)
+    return turned[:, 0], turned[:, 1]
+
+
+def instances(points: Array, vectors: Array, largest: float, longest: float) -> Instances:
+    """An instance a vector: `largest` gets the length `longest` [m], others their share."""
+    size = np.linalg.norm(vectors, axis=1)
+    size = np.where(np.isfinite(size), size, 0.0)
+    share = size / largest if largest > 0 else np.zeros_like(size)
+    up = np.array([0.0, 0.0, 1.0])
+    directions = np.where(size[:, None] > 0, vectors / np.maximum(size, 1e-300)[:, None], up)
+    scales = longest * np.maximum(share, _NOTHING)
+    return Instances(points, turning_z_to(directions), scales, colors_of(share))

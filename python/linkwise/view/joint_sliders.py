@@ -1,0 +1,129 @@
+"""Sliders that pose a model."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise.record.labels import joint_scalars
+from linkwise.view.shapes import Array
+
+if TYPE_CHECKING:
+    import viser
+
+    from linkwise._core import Model
+    from linkwise.view.panel import Wishes
+
+MOST_SLIDERS = 60
+
+
+class JointSliders:
+    """A slider a coordinate, between its limits; of long models those of the first joints.
+
+    The four coordinates of a quaternion are set by three angles, about x, then y, then z.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, model: Model, size: float, wishes: Wishes
+    ) -> None:
+        self._model = model
+        self.q = model.neutral_configuration()
+        self._sliders: list[Any] = []
+        self._resets: list[float] = []
+        joints = self._shown_joints()
+        with server.gui.add_folder("Joints"):
+            server.gui.add_button("Zero").on_click(lambda event: self._reset(wishes))
+            for joint in joints:
+                self._add_joint(server, joint, size, wishes)
+            if len(joints) < model.n_joints:
+                server.gui.add_markdown(f"{model.n_joints - len(joints)} more joints stay at zero.")
+
+    def _shown_joints(self) -> list[int]:
+        total, shown = 0, []
+        for joint, count in enumerate(self._model.joint_nv):
+            total += count
+            if total > MOST_SLIDERS:
+                break
+            shown.append(joint)
+        return shown
+
+    def _add_joint(
+        self, server: viser.ViserServer, joint: int, size: float, wishes: Wishes
+    ) -> None:
+        """Rows of one joint: label, first coordinate, limits, and how it is set."""
+        model = self._model
+        scalars = joint_scalars(model, [joint])[0]
+        first = sum(model.joint_nq[:joint])
+        turning = [k for k, label in enumerate(scalars.labels) if _in_quaternion(label, scalars)]
+        dof = sum(model.joint_nv[:joint])
+        plain = [k for k in range(len(scalars.labels)) if k not in turning]
+        for k in plain:
+            reach = size if str(scalars.units[k]) == "m" else math.pi
+            low, high = _limits(model, dof + k if not turning else -1, reach)
+            label, at = f"{scalars.labels[k]} [{scalars.units[k]}]", first + k
+
+            def move(value: float, at: int = at) -> None:
+                self.q[at] = value
+
+            self._add(server, label, low, high, wishes, move, self.q[at])
+        if turning:
+            angles = np.zeros(3)
+            name = model.joint_names[joint]
+            where = slice(first + turning[0], first + turning[0] + 4)
+            for axis in range(3):
+
+                def turn(value: float, axis: int = axis) -> None:
+                    angles[axis] = value
+                    self.q[where] = quaternion_of(angles)
+
+                self._add(server, f"{name}.{'xyz'[axis]} [rad]", -math.pi, math.pi, wishes, turn, 0)
+
+    def _add(
+        self, server: Any, label: str, low: float, high: float, wishes: Wishes, act: Any, start: Any
+    ) -> None:
+        value = float(np.clip(start, low, high))
+        act(value)
+        slider = server.gui.add_slider(
+            label, min=low, max=high, step=(high - low) / 1000, initial_value=value
+        )
+
+        def move(event: Any) -> None:
+            act(slider.value)
+            wishes.redraw = True
+
+        slider.on_update(move)
+        self._sliders.append(slider)
+        self._resets.append(value)
+
+    def _reset(self, wishes: Wishes) -> None:
+        for slider, value in zip(self._sliders, self._resets, strict=True):
+            slider.value = value  # its callback sets the coordinate
+        wishes.redraw = True
+
+
+def _in_quaternion(label: Any, scalars: Any) -> bool:
+    return str(label).rpartition(".")[2] in ("qx", "qy", "qz", "qw") and len(scalars.labels) >= 4
+
+
+def _limits(model: Model, dof: int, reach: float) -> tuple[float, float]:
+    """The joint's own limits where both are finite and apart, else a reach around zero."""
+    if dof >= 0:
+        low, high = float(model.lower_limit[dof]), float(model.upper_limit[dof])
+        if math.isfinite(low) and math.isfinite(high) and high > low:
+            return low, high
+    return -reach, reach
+
+
+def quaternion_of(angles: Array) -> Array:
+    """x, y, z, w of turns about x, then y, then z, each about fixed axes."""
+    (sx, sy, sz), (cx, cy, cz) = np.sin(angles / 2), np.cos(angles / 2)
+    return np.array(
+        [
+            sx * cy * cz - cx * sy * sz,
+            cx * sy * cz + sx * cy * sz,
+            cx * cy * sz - sx * sy * cz,
+            cx * cy * cz + sx * sy * sz,
+        ]
+    )

@@ -1,0 +1,149 @@
+"""The view in the browser: one thread that moves time, acts on wishes and draws."""
+
+from __future__ import annotations
+
+import threading
+import time as clock
+import webbrowser
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from linkwise.view.joint_sliders import JointSliders
+from linkwise.view.load_plot import LoadPlot
+from linkwise.view.panel import (
+    JointChoice,
+    PlaybackControls,
+    Wishes,
+    add_show_folder,
+    headline,
+    legend,
+)
+from linkwise.view.playback import Playback, sample_at
+from linkwise.view.scene import Scene
+from linkwise.view.server import running
+from linkwise.view.source import Recording, Source, static_loads
+
+if TYPE_CHECKING:
+    import viser
+
+_FRAME = 1 / 30
+_PLOT_INTERVAL = 0.1
+
+
+class View:
+    """A source on a server: the scene, the panel, and what moves them."""
+
+    def __init__(self, server: viser.ViserServer, source: Source) -> None:
+        self._source = source
+        self._wishes = Wishes(redraw=True)
+        self._joint = 0
+        self._sample = -1
+        self._told = 0.0
+        server.gui.add_html(headline(source))
+        self.scene = Scene(server, source)
+        names = source.model.joint_names
+        recording = source.recording
+        self._plot: LoadPlot | None = None
+        self._choice: JointChoice | None = None
+        self._playback: Playback | None = None
+        if recording is not None:
+            self.scene.set_largest(*recording.largest)
+            self._playback = Playback(float(recording.times[0]), float(recording.times[-1]))
+            self._controls = PlaybackControls(server, self._playback, self._wishes)
+        add_show_folder(server, self.scene, self._wishes)
+        if recording is None:
+            self._sliders = JointSliders(server, source.model, 0.5 * self.scene.size, self._wishes)
+        if recording is None or recording.has_loads:
+            with server.gui.add_folder("Joint load"):
+                self._legend = server.gui.add_html(
+                    legend(recording.largest if recording else (0, 0))
+                )
+                self._choice = JointChoice(server, self.scene, names, self._wishes)
+                if recording is not None:
+                    self._plot = LoadPlot(server, recording)
+                    self._plot.choose(0)
+
+    def step(self, seconds: float) -> None:
+        """Let wall time pass and draw what changed."""
+        wishes, self._wishes.redraw = self._wishes.redraw, False
+        while self._wishes.toggles:
+            self.scene.toggle(*self._wishes.toggles.popitem())
+        if self._wishes.joint is not None:
+            self._joint = self._source.model.joint_index(self._wishes.joint)
+            self._wishes.joint = None
+            if self._plot is not None:
+                self._plot.choose(self._joint)
+            wishes = True
+        if self._source.recording is None:
+            if wishes:
+                self._draw_pose()
+        else:
+            self._draw_sample(self._source.recording, seconds, wishes)
+
+    def _draw_pose(self) -> None:
+        model, q = self._source.model, self._sliders.q.copy()
+        loads = static_loads(model, q)
+        largest = tuple(
+            float(np.linalg.norm(half, axis=1).max(initial=0.0))
+            for half in (loads[:, :3], loads[:, 3:])
+        )
+        self.scene.set_largest(*largest)
+        self.scene.show(self.scene.at(q, loads))
+        self._legend.content = legend((largest[0], largest[1]))
+        self._tell("held still: ", loads[self._joint])
+
+    def _draw_sample(self, recording: Recording, seconds: float, forced: bool) -> None:
+        playback = self._playback
+        assert playback is not None
+        moved = playback.advance(seconds)
+        if not (moved or forced):
+            return
+        sample = sample_at(recording.times, playback.time)
+        if sample != self._sample or forced:
+            self._sample = sample
+            loads = recording.load(sample) if recording.has_loads else None
+            self.scene.show(self.scene.at(recording.position(sample), loads))
+        now = clock.monotonic()
+        if forced or not playback.playing or now - self._told > _PLOT_INTERVAL:
+            self._told = now
+            self._controls.show()
+            if self._plot is not None:
+                self._plot.show(playback.time)
+                self._tell(
+                    f"t = {recording.times[sample]:.4g} s: ", recording.load(sample)[self._joint]
+                )
+
+    def _tell(self, head: str, load: np.ndarray) -> None:
+        if self._choice is not None:
+            force, moment = np.linalg.norm(load[:3]), np.linalg.norm(load[3:])
+            self._choice.tell(f"{head}{force:.4g} N, {moment:.4g} N m")
+
+
+def show(
+    source: Source,
+    *,
+    host: str,
+    port: int,
+    open_browser: bool,
+    started: Callable[[str], object],
+    stop: threading.Event | None = None,
+) -> None:
+    """Serve until Ctrl-C (or `stop`); `started` is told the address."""
+    with running(host, port, source.title) as server:
+        view = View(server, source)
+        view.step(0.0)
+        shown_host = "127.0.0.1" if host in ("0.0.0.0", "::", "") else host
+        address = f"http://{shown_host}:{server.get_port()}"
+        started(address)
+        if open_browser:
+            webbrowser.open(address)
+        before = clock.monotonic()
+        ended = stop or threading.Event()
+        while True:
+            now = clock.monotonic()
+            view.step(now - before)
+            before = now
+            if ended.wait(max(0.005, _FRAME - (clock.monotonic() - now))):
+                return

@@ -1,0 +1,37 @@
+"""Mesh files as trimesh objects."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import trimesh
+
+MOST_FACES = 2_000_000
+
+
+def load_mesh(
+    path: Path, color: tuple[float, float, float, float] | None
+) -> trimesh.Trimesh | None:
+    """The mesh of a local file as one piece, in its own colours, or in `color` if it has none.
+
+    None when the file cannot be read: looks never stop anybody.
+    """
+    import trimesh
+
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
+    try:
+        scene = trimesh.load_scene(path)
+        mesh = scene.to_mesh()
+    except Exception:  # parsers of a dozen formats: they raise what comes to hand
+        return None
+    if not isinstance(mesh, trimesh.Trimesh) or not 0 < len(mesh.faces) <= MOST_FACES:
+        return None
+    if color is not None and not mesh.visual.defined:
+        rgba = np.array(np.round(255 * np.array(color)), dtype=np.uint8)
+        mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=rgba)
+    return mesh

@@ -1,0 +1,371 @@
+"""The machine in viser: groups of instances, one message a group and moment however many links."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise import _core
+from linkwise.io.urdf_visuals import Visual
+from linkwise.view.arrows import in_world, instances
+from linkwise.view.meshes import load_mesh
+from linkwise.view.shapes import (
+    Array,
+    Mesh,
+    equivalent_boxes,
+    quaternions,
+    turning_z_to,
+    unit_arc,
+    unit_arrow,
+    unit_box,
+    unit_cylinder,
+    unit_sphere,
+)
+
+if TYPE_CHECKING:
+    import viser
+
+    from linkwise.view.source import Source
+
+_TONES = np.array([[86, 112, 140], [150, 170, 190]], dtype=np.uint8)
+_ROD_TONE, _MARK_TONE, _BOX_TONE = (120, 132, 146), (52, 58, 66), (230, 150, 60)
+_PLAIN = (0.62, 0.66, 0.70, 1.0)
+_MANY = 1500  # joints, above which marks at every joint only hide the links
+_ARROW_SHARE = 0.22  # of the machine's size: the largest load's arrow
+
+
+@dataclass
+class Moment:
+    """One moment of the machine: frames of links and joints (n, 4, 4), loads (n_joints, 6)."""
+
+    links: Array
+    joints: Array
+    loads: Array | None
+
+
+@dataclass
+class Layer:
+    """A group of instances; `place` gives what changes with the moment."""
+
+    handle: Any
+    place: Callable[[Moment], dict[str, Array]]
+
+    def show(self, moment: Moment) -> None:
+        if self.handle.visible:
+            for name, values in self.place(moment).items():
+                setattr(self.handle, f"batched_{name}", values)
+
+
+class Scene:
+    """Draws a source; `toggles` says what can be shown and hidden, and whether it is shown."""
+
+    def __init__(self, server: viser.ViserServer, source: Source) -> None:
+        self._scene = server.scene
+        self._model = model = source.model
+        self._inboard = np.array(model.joint_parents, dtype=int)
+        self._largest = (0.0, 0.0)
+        self.arrow_scale = 1.0
+        self._layers: dict[str, list[Layer]] = defaultdict(list)
+        self.joint_marks: Any = None
+        start = model.neutral_configuration()
+        if source.recording is not None:
+            start = source.recording.position(0)
+        self._moment = self.at(start, None)
+        self.center, self.size = _extent(self._moment, model)
+        self.toggles: dict[str, bool] = {}
+        self._add_looks(source)
+        self._add_shapes(bare="Meshes" not in self.toggles)
+        if source.recording is None or source.recording.has_loads:
+            self._add_loads(shown=source.recording is not None)
+        self._frame_camera(server)
+        for name, shown in self.toggles.items():
+            self.toggle(name, shown)
+
+    # -- moments ----------------------------------------------------------------------------
+
+    def at(self, q: Array, loads: Array | None) -> Moment:
+        links = np.asarray(_core.link_poses(self._model, q))
+        return Moment(links, np.asarray(_core.body_poses(self._model, q)), loads)
+
+    def show(self, moment: Moment) -> None:
+        self._moment = moment
+        for layers in self._layers.values():
+            for layer in layers:
+                layer.show(moment)
+
+    def toggle(self, name: str, shown: bool) -> None:
+        """Show or hide a layer. Hidden ones are not kept up to date, so it is placed again."""
+        self.toggles[name] = shown
+        for layer in self._layers[name]:
+            layer.handle.visible = shown
+            layer.show(self._moment)
+
+    def set_largest(self, force: float, moment: float) -> None:
+        """The magnitudes that get the longest arrow and arc."""
+        self._largest = (force, moment)
+
+    # -- links ------------------------------------------------------------------------------
+
+    def _add(self, toggle: str, shown: bool, mesh: Mesh, count: int, **style: Any) -> Any:
+        """An empty group of `count` instances."""
+        self.toggles.setdefault(toggle, shown)
+        name = f"/{toggle.lower().replace(' ', '_')}/{len(self._layers[toggle])}"
+        return self._scene.add_batched_meshes_simple(
+            name,
+            mesh.vertices,
+            mesh.faces,
+            np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+            np.zeros((count, 3)),
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+            **style,
+        )
+
+    def _add_looks(self, source: Source) -> None:
+        """The visuals of the model's file; equal meshes are instances of one."""
+        index = {name: k for k, name in enumerate(self._model.link_names)}
+        groups: dict[tuple[str, Path | None, Any], list[Visual]] = defaultdict(list)
+        for visual in source.looks.visuals:
+            if visual.link in index:
+                scale = visual.size if visual.shape == "mesh" else None
+                groups[visual.shape, visual.path, (scale, visual.color)].append(visual)
+        for (shape, path, _), visuals in groups.items():
+            links = np.array([index[visual.link] for visual in visuals])
+            offsets = np.stack([visual.placement for visual in visuals])
+            handle = self._add_look(shape, path, visuals, source.notes)
+            if handle is not None:
+                self._layers["Meshes"].append(Layer(handle, _following(links, offsets)))
+
+    def _add_look(
+        self, shape: str, path: Path | None, visuals: list[Visual], notes: list[str]
+    ) -> Any:
+        first = visuals[0]
+        color = first.color or _PLAIN
+        count = len(visuals)
+        if path is not None:
+            mesh = load_mesh(path, first.color)
+            if mesh is None:
+                notes.append(f"mesh {path.name!r} cannot be read and is left out")
+                return None
+            self.toggles.setdefault("Meshes", True)
+            return self._scene.add_batched_meshes_trimesh(
+                f"/meshes/{len(self._layers['Meshes'])}",
+                mesh,
+                np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+                np.zeros((count, 3)),
+                batched_scales=np.tile(first.size, (count, 1)),
+                lod="off",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        unit = {"box": unit_box, "cylinder": unit_cylinder, "sphere": unit_sphere}[shape]()
+        return self._add(
+            "Meshes",
+            True,
+            unit,
+            count,
+            batched_scales=np.array([visual.size for visual in visuals]),
+            batched_colors=np.array(np.round(255 * np.array(color[:3])), dtype=np.uint8),
+            opacity=color[3] if color[3] < 1 else None,
+        )
+
+    def _add_shapes(self, *, bare: bool) -> None:
+        """Boxes from the inertias, rods between joint points, marks at joints."""
+        model, inboard = self._model, self._inboard
+        boxes = equivalent_boxes(model.link_masses, model.link_inertias)
+        offsets = np.tile(np.eye(4), (len(boxes.edges), 1, 1))
+        offsets[:, :3, :3] = boxes.axes
+        offsets[:, :3, 3] = model.link_centers_of_mass
+        solid = np.flatnonzero(boxes.edges.max(axis=1, initial=0.0) > 0)
+        near = solid[_stays_near(self._moment, model, boxes.edges, offsets)[solid]]
+        for toggle, chosen, shown, style in (
+            ("Bodies", near, bare, {"batched_colors": _TONES[near % 2]}),
+            ("Inertia boxes", solid, False, {"batched_colors": _BOX_TONE, "opacity": 0.35}),
+        ):
+            if chosen.size:
+                edges = boxes.edges[chosen]
+                handle = self._add(
+                    toggle, shown, unit_box(), chosen.size, batched_scales=edges, **style
+                )
+                self._layers[toggle].append(Layer(handle, _following(chosen, offsets[chosen])))
+        outboard = np.flatnonzero(inboard >= 0)
+        thick = self._thickness()
+        if outboard.size:
+            handle = self._add(
+                "Bodies",
+                bare,
+                unit_cylinder(8),
+                outboard.size,
+                batched_scales=np.ones((outboard.size, 3)),
+                batched_colors=_ROD_TONE,
+            )
+            ends = (inboard[outboard], outboard)
+            self._layers["Bodies"].append(Layer(handle, _spanning(ends, 0.55 * thick)))
+        few = model.n_joints <= _MANY
+        self.joint_marks = self._add(
+            "Joints",
+            bare and few,
+            unit_sphere(12 if few else 6),
+            model.n_joints,
+            batched_scales=np.full(model.n_joints, thick),
+            batched_colors=_MARK_TONE,
+        )
+        self._layers["Joints"].append(
+            Layer(self.joint_marks, lambda moment: {"positions": moment.joints[:, :3, 3]})
+        )
+
+    def _thickness(self) -> float:
+        """Radius of the joint marks: small beside the links and, of short chains, the machine."""
+        points = self._moment.joints[:, :3, 3]
+        spans = np.linalg.norm(points - points[self._inboard], axis=1)[self._inboard >= 0]
+        spans = spans[spans > 1e-6 * self.size]
+        typical = float(np.mean(spans)) if spans.size else self.size
+        return min(0.07 * typical, 0.02 * self.size)
+
+    # -- loads ------------------------------------------------------------------------------
+
+    def _add_loads(self, *, shown: bool) -> None:
+        few = self._model.n_joints <= _MANY
+        for half, (toggle, mesh) in enumerate(
+            (
+                ("Forces", unit_arrow(10 if few else 5)),
+                ("Moments", unit_arc(*((6, 28) if few else (3, 12)))),
+            )
+        ):
+            handle = self._add(
+                toggle,
+                shown,
+                mesh,
+                self._model.n_joints,
+                batched_scales=np.full(self._model.n_joints, 1e-9),
+                batched_colors=np.zeros((self._model.n_joints, 3), dtype=np.uint8),
+            )
+            self._layers[toggle].append(Layer(handle, self._loads(half)))
+
+    def _loads(self, half: int) -> Callable[[Moment], dict[str, Array]]:
+        def place(moment: Moment) -> dict[str, Array]:
+            if moment.loads is None:
+                return {}
+            vectors = in_world(moment.joints, moment.loads)[half]
+            longest = _ARROW_SHARE * self.size * self.arrow_scale
+            made = instances(moment.joints[:, :3, 3], vectors, self._largest[half], longest)
+            return {
+                "positions": made.positions,
+                "wxyzs": made.quaternions,
+                "scales": made.scales,
+                "colors": made.colors,
+            }
+
+        return place
+
+    # -- view -------------------------------------------------------------------------------
+
+    def _frame_camera(self, server: viser.ViserServer) -> None:
+        self._scene.set_up_direction("+z")
+        camera = server.initial_camera
+        right, away = _across(self._moment)
+        middle = self.center + 0.2 * self.size * right  # the panel covers the right of the window
+        camera.position = middle + 1.4 * self.size * away
+        camera.look_at = middle
+        camera.fov = np.deg2rad(50)
+        camera.near, camera.far = 1e-3 * self.size, 100 * self.size
+        self._scene.world_axes.visible = False
+        cell = 10.0 ** np.floor(np.log10(max(self.size, 1e-9)))
+        grid = self._scene.add_grid(
+            "/grid",
+            width=4 * self.size,
+            height=4 * self.size,
+            cell_size=cell / 2,
+            section_size=5 * cell / 2,
+            position=(self.center[0], self.center[1], self._floor()),
+            shadow_opacity=0.0,
+            cell_color=(225, 228, 232),
+            section_color=(190, 196, 204),
+        )
+        self.toggles["Grid"] = True
+        self._layers["Grid"].append(Layer(grid, lambda moment: {}))
+
+    def _floor(self) -> float:
+        """Height of the grid: the lowest point, or the ground where the machine stands on it."""
+        points = np.concatenate([self._moment.links[:, :3, 3], self._moment.joints[:, :3, 3]])
+        return min(0.0, float(points[:, 2].min()) - 0.02 * self.size)
+
+
+def _across(moment: Moment) -> tuple[Array, Array]:
+    """Unit vectors to the right and to the camera, which sees the machine from its broad side."""
+    points = np.concatenate([moment.links[:, :2, 3], moment.joints[:, :2, 3]])
+    spread, axes = np.linalg.eigh(np.cov(points.T))
+    x, y = axes[:, 1] if spread[1] > 1.5 * spread[0] else (1.0, 0.0)
+    turn = 0.35  # not quite broadside, so that the picture has depth
+    right = np.array([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), 0])
+    right *= 1.0 if right[0] >= 0 else -1.0
+    away = np.array([right[1], -right[0], 0.45])
+    return right, away / np.linalg.norm(away)
+
+
+def _following(links: Any, offsets: Array) -> Callable[[Moment], dict[str, Array]]:
+    def place(moment: Moment) -> dict[str, Array]:
+        frames = moment.links[links] @ offsets
+        return {"positions": frames[:, :3, 3], "wxyzs": quaternions(frames[:, :3, :3])}
+
+    return place
+
+
+def _spanning(ends: tuple[Any, Any], radius: float) -> Callable[[Moment], dict[str, Array]]:
+    """Rods between joint points: a sliding joint changes their length."""
+
+    def place(moment: Moment) -> dict[str, Array]:
+        here, there = (moment.joints[end, :3, 3] for end in ends)
+        span = there - here
+        length = np.linalg.norm(span, axis=1)
+        along = np.where(length[:, None] > 0, span / np.maximum(length, 1e-300)[:, None], [0, 0, 1])
+        scales = np.column_stack([np.full((length.size, 2), radius), np.maximum(length, 1e-9)])
+        return {
+            "positions": (here + there) / 2,
+            "wxyzs": turning_z_to(along),
+            "scales": scales,
+        }
+
+    return place
+
+
+def _extent(moment: Moment, model: _core.Model) -> tuple[Array, float]:
+    """Centre and size of the machine: of its joint points, centres of mass and boxes."""
+    boxes = equivalent_boxes(model.link_masses, model.link_inertias).edges
+    centers = np.einsum("nij,nj->ni", moment.links[:, :3, :3], model.link_centers_of_mass)
+    centers = (centers + moment.links[:, :3, 3])[model.link_masses > 0]
+    points = np.concatenate([moment.joints[:, :3, 3], moment.links[:, :3, 3], centers])
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float(np.linalg.norm(high - low))
+    largest = float(np.median(boxes.max(axis=1))) if len(boxes) else 0.0
+    return (low + high) / 2, max(size, largest, 1e-3)
+
+
+def _stays_near(moment: Moment, model: _core.Model, edges: Array, offsets: Array) -> Any:
+    """Which links' boxes lie about where the link is: between its joint points.
+
+    An inertia that is published about a joint, with no first moment, gives a box that sticks out
+    far behind the joint: true to the numbers, but no picture of the link.
+    """
+    names = {name: k for k, name in enumerate(model.link_names)}
+    link_of = np.array([names[name] for name in model.body_names], dtype=int)
+    inboard = np.array(model.joint_parents, dtype=int)
+    points = moment.joints[:, :3, 3]
+    outboard = np.flatnonzero(inboard >= 0)
+    reach, middle = np.zeros(len(edges)), np.zeros((len(edges), 3))
+    for joint in outboard:  # the farthest outboard joint point of each link
+        link = link_of[inboard[joint]]
+        span = points[joint] - points[inboard[joint]]
+        distance = float(np.linalg.norm(span))
+        if distance > reach[link]:
+            reach[link] = distance
+            middle[link] = points[inboard[joint]] + span / 2
+    centers = (moment.links @ offsets)[:, :3, 3]
+    far = np.linalg.norm(centers - middle, axis=1) + 0.5 * np.linalg.norm(edges, axis=1)
+    return (reach == 0) | (far <= 0.8 * reach)

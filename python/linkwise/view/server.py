@@ -1,0 +1,78 @@
+"""A viser server that stays on this machine unless told otherwise."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import os
+import socket
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from linkwise._core import InputError
+
+if TYPE_CHECKING:
+    import viser
+
+LOCAL = "127.0.0.1"
+
+
+def _viser() -> Any:
+    try:
+        import viser
+    except ImportError:
+        raise InputError("view needs the package viser; pip install 'linkwise[view]'") from None
+    return viser
+
+
+def check_address(host: str, port: int) -> None:
+    """InputError unless a server may listen there; viser itself would take another port."""
+    if not 0 <= port <= 65535:
+        raise InputError(
+            f"port {port}: is not a port; give a number from 0 (any free one) to 65535"
+        )
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+    except PermissionError:
+        raise InputError(f"port {port}: may not be used; give --port 8081") from None
+    except socket.gaierror:
+        raise InputError(f"host {host!r}: is unknown; give an address of this machine") from None
+    except OSError as error:
+        if error.errno == errno.EADDRNOTAVAIL:
+            raise InputError(
+                f"host {host!r}: is no address of this machine; leave --host out"
+            ) from None
+        raise InputError(
+            f"port {port}: is in use on {host}; give another with --port, or --port 0 for any free "
+            "one"
+        ) from None
+
+
+@contextlib.contextmanager
+def running(host: str, port: int, title: str) -> Iterator[viser.ViserServer]:
+    """A server until the block ends, which no client can make reachable from outside."""
+    viser = _viser()
+    check_address(host, port)
+    os.environ.pop("_VISER_PORT_OVERRIDE", None)
+
+    class Server(viser.ViserServer):  # type: ignore[misc, name-defined]
+        def request_share_url(self, verbose: bool = True) -> str | None:
+            """Never: it would hand the scene to a relay on the network."""
+            return None
+
+    with contextlib.redirect_stdout(io.StringIO()):  # it draws a box around its address
+        server = Server(host=host, port=port, label=title, verbose=False)
+    try:
+        if port and server.get_port() != port:
+            raise InputError(f"port {port}: is in use on {host}; give another with --port")
+        server.gui.configure_theme(
+            show_logo=False, show_share_button=False, control_width="large", dark_mode=False
+        )
+        yield server
+    finally:
+        with contextlib.redirect_stdout(io.StringIO()):  # it prints that it stops
+            server.stop()

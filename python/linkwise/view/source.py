@@ -1,0 +1,199 @@
+"""What is shown: a run with the model that it holds, or a model alone."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from linkwise._core import InputError, Model, inverse_dynamics_loads
+from linkwise.io.complaint import near
+from linkwise.io.urdf_visuals import Looks, read_looks
+from linkwise.view.shapes import Array
+
+if TYPE_CHECKING:
+    from linkwise.result import Run
+
+_BLOCK_BYTES = 64 << 20
+PathLike = str | os.PathLike[str]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to find a model and its looks.
+
+    model: file to take model or looks from instead of the run's own; package_dirs, floating_base:
+    as in linkwise.load; loads: whether joint loads are shown.
+    """
+
+    model: Path | None = None
+    package_dirs: Sequence[Path] = ()
+    floating_base: bool = False
+    loads: bool = True
+
+
+class Recording:
+    """The samples of a run, read block by block: a run may be larger than memory.
+
+    times: (n,); largest: the largest force [N] and moment [N m] of all joints and samples.
+    """
+
+    def __init__(self, run: Run, model: Model, *, loads: bool) -> None:
+        self._shown = f"run {str(run.path)!r}"
+        self.has_loads = loads
+        self._check(run, model)
+        self.times: Array = np.asarray(run.dataset["time"].values, dtype=float)
+        self._dataset = run.dataset
+        self._row_bytes = 8 * (model.nq + (6 * model.n_joints if loads else 0))
+        self._first = self._last = 0
+        self._positions = np.zeros((0, model.nq))
+        self._loads = np.zeros((0, model.n_joints, 6))
+        self.largest = (0.0, 0.0)
+        if loads:
+            peaks = run.peak_loads()
+            self.largest = (float(peaks["force"].max()), float(peaks["moment"].max()))
+
+    def _check(self, run: Run, model: Model) -> None:
+        held = run.dataset
+        needed = {"position": model.nq}
+        if self.has_loads:
+            needed["joint_load"] = model.n_joints
+        for name, count in needed.items():
+            if name not in held:
+                remedy = " or view it with --no-loads" if name == "joint_load" else ""
+                raise InputError(
+                    f"{self._shown}: holds no {name}; record the quantity {name!r}{remedy}"
+                )
+            if held[name].shape[1] != count:
+                raise InputError(
+                    f"{self._shown}: holds {name} of {held[name].shape[1]} of {count} "
+                    f"{'joints' if name == 'joint_load' else 'coordinates'}; record all joints"
+                )
+        if held.sizes["time"] == 0:
+            raise InputError(f"{self._shown}: holds no samples; simulate again")
+
+    def _read(self, sample: int) -> int:
+        """Row of `sample` in the block at hand, which is replaced when it is not in there."""
+        if not self._first <= sample < self._last:
+            rows = max(1, _BLOCK_BYTES // max(1, self._row_bytes))
+            self._first = sample - sample % rows
+            self._last = min(self._first + rows, self.times.size)
+            block = self._dataset.isel(time=slice(self._first, self._last))
+            self._positions = block["position"].values
+            if self.has_loads:
+                loads = block["joint_load"].transpose("time", "joint", "component")
+                self._loads = loads.values
+        return sample - self._first
+
+    def position(self, sample: int) -> Array:
+        row = self._read(sample)
+        return np.asarray(self._positions[row])
+
+    def load(self, sample: int) -> Array:
+        """Loads (n_joints, 6) in the joint frames."""
+        row = self._read(sample)
+        return np.asarray(self._loads[row])
+
+    def history(self, joint: int, most: int) -> tuple[Array, Array]:
+        """Times (n,) and loads (n, 6) of one joint, at most `most` evenly spaced samples."""
+        load = self._dataset["joint_load"].transpose("time", "joint", "component")[:, joint]
+        chosen = np.unique(np.linspace(0, self.times.size - 1, most).astype(int))
+        return self.times[chosen], np.asarray(load.values[chosen])
+
+
+@dataclass(frozen=True)
+class Source:
+    """A model, how its links look, and the samples of a run (None: the model alone)."""
+
+    title: str
+    model: Model
+    looks: Looks
+    recording: Recording | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+def static_loads(model: Model, q: Array) -> Array:
+    """Loads (n_joints, 6) while the machine is held still in the pose q."""
+    rest = np.zeros(model.nv)
+    return np.asarray(inverse_dynamics_loads(model, q, rest, rest))
+
+
+def open_source(target: PathLike, options: Options) -> Source:
+    """What `linkwise view TARGET` shows: a folder is a run, a file is a model or a scenario.
+
+    Raises InputError when it is neither, or lacks what is needed.
+    """
+    path = Path(target)
+    if path.is_dir():
+        return _open_run(path, options)
+    if options.model is not None:
+        raise InputError(f"{str(path)!r}: --model goes with a run, and this is a file; remove it")
+    model, file, package_dirs = _load_model(path, options)
+    looks = Looks([], [], []) if file is None else read_looks(file, package_dirs)
+    return Source(model.name, model, looks, None, _notes(looks))
+
+
+def _load_model(path: Path, options: Options) -> tuple[Model, Path | None, Sequence[Path]]:
+    """The model of a file, the file that may say how it looks, and where its packages are."""
+    from linkwise.io.load import load
+    from linkwise.scenario import load_scenario
+
+    if path.suffix.lower() != ".toml":
+        model = load(path, floating_base=options.floating_base, package_dirs=options.package_dirs)
+        return model, path, options.package_dirs
+    scenario = load_scenario(path)
+    model = scenario.load_model()
+    folders = [Path(scenario.resolve(folder)) for folder in scenario.settings.package_dirs]
+    file = Path(model.source) if model.source else None
+    return model, file, [*folders, *options.package_dirs]
+
+
+def _open_run(path: Path, options: Options) -> Source:
+    from linkwise.record.machine import read_model
+    from linkwise.record.read import open_run
+
+    run = open_run(path)
+    if options.model is not None:
+        model, file, package_dirs = _load_model(options.model, options)
+        _check_same_machine(run, model, options.model)
+    else:
+        model, package_dirs = read_model(path), options.package_dirs
+        file = _file_beside(path, str(run.dataset.attrs.get("model_source", "")))
+    looks = Looks([], [], [])
+    if file is not None:
+        looks = read_looks(file, package_dirs)
+        if set(looks.links) - set(model.link_names):  # another machine under the same name
+            looks = Looks([], [], [])
+    recording = Recording(run, model, loads=options.loads)
+    return Source(model.name, model, looks, recording, _notes(looks))
+
+
+def _file_beside(path: Path, name: str) -> Path | None:
+    """The model's file next to the run or in the current folder; a run keeps its name alone."""
+    if not name or name != Path(name).name:
+        return None
+    return next((f for f in (path.parent / name, Path(name)) if f.is_file()), None)
+
+
+def _check_same_machine(run: Run, model: Model, file: Path) -> None:
+    held = [str(name) for name in run.dataset["joint"].values] if "joint" in run.dataset else []
+    known = model.joint_names
+    for name in held:
+        if name not in known:
+            raise InputError(
+                f"{str(file)!r}: has no joint {name!r}, which the run has; {near(name, known)}"
+            )
+
+
+def _notes(looks: Looks) -> list[str]:
+    if not looks.missing:
+        return []
+    first = Path(looks.missing[0]).name
+    return [
+        f"{len(looks.missing)} meshes are not on this disk (the first is {first!r}); "
+        "--package-dir says where packages are"
+    ]
