@@ -159,10 +159,14 @@ TEST(Iterations, BothFormsOfConjugateGradientsAreTheSame) {
     const std::vector<double> start = random_vector(tree.size(), 5);
     for (int k : {1, 2, 3, 5, 10, 20}) {
       SolverOptions options = iterations(k);
-      const std::vector<double> two = iterate("conjugate_gradient", tree, b, start, options);
+      std::vector<double> two = start, three = start;
+      const Report first = make_solver("conjugate_gradient", options)->solve(tree, b, two);
       options.form = ConjugateGradientForm::three_term;
-      const std::vector<double> three = iterate("conjugate_gradient", tree, b, start, options);
+      const Report second = make_solver("conjugate_gradient", options)->solve(tree, b, three);
       EXPECT_LT(energy_error(dense, three, two), 1e-10) << k;
+      if (std::isfinite(first.error_estimate)) {
+        EXPECT_NEAR(second.error_estimate / first.error_estimate, 1.0, 1e-6) << k;
+      }
     }
     SolverOptions options;
     std::vector<double> x = start, y = start;
@@ -171,7 +175,6 @@ TEST(Iterations, BothFormsOfConjugateGradientsAreTheSame) {
     const Report three = make_solver("conjugate_gradient", options)->solve(tree, b, y);
     EXPECT_TRUE(two.ok() && three.ok());
     EXPECT_NEAR(two.iterations, three.iterations, 1);
-    EXPECT_NEAR(two.error_estimate, three.error_estimate, 0.5 * two.error_estimate);
   }
 }
 
