@@ -42,7 +42,7 @@ def color_bar() -> str:
 def in_world(frames: Array, loads: Array) -> tuple[Array, Array]:
     """Forces and moments (n, 3) along the world's axes of loads (n, 6) along those of `frames`."""
     halves = loads.reshape(-1, 2, 3)
-    turned = np.einsum("nij,nkj->nki", frames[:, :3, :3], halves)
+    turned = halves @ frames[:, :3, :3].swapaxes(1, 2)
     return turned[:, 0], turned[:, 1]
 
 

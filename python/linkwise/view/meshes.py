@@ -31,7 +31,7 @@ def load_mesh(
         return None
     if not isinstance(mesh, trimesh.Trimesh) or not 0 < len(mesh.faces) <= MOST_FACES:
         return None
-    if color is not None and not mesh.visual.defined:
+    if color is not None and (mesh.visual is None or not mesh.visual.defined):
         rgba = np.array(np.round(255 * np.array(color)), dtype=np.uint8)
         mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=rgba)
     return mesh

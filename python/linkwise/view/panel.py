@@ -67,7 +67,7 @@ class PlaybackControls:
         span = playback.end - playback.start
         with server.gui.add_folder("Playback"):
             self._button = server.gui.add_button("Play")
-            self._time = server.gui.add_slider(
+            self._time: Any = server.gui.add_slider(
                 "Time [s]",
                 min=playback.start,
                 max=playback.end if span > 0 else playback.start + 1,

@@ -50,15 +50,15 @@ class Moment:
 
 @dataclass
 class Layer:
-    """A group of instances; `place` gives what changes with the moment."""
+    """Something drawn; `place` gives the properties of its handle that change with the moment."""
 
     handle: Any
-    place: Callable[[Moment], dict[str, Array]]
+    place: Callable[[Moment], dict[str, Any]]
 
     def show(self, moment: Moment) -> None:
         if self.handle.visible:
             for name, values in self.place(moment).items():
-                setattr(self.handle, f"batched_{name}", values)
+                setattr(self.handle, name, values)
 
 
 class Scene:
@@ -208,6 +208,14 @@ class Scene:
             ends = (inboard[outboard], outboard)
             self._layers["Bodies"].append(Layer(handle, _spanning(ends, 0.55 * thick)))
         few = model.n_joints <= _MANY
+        if not few:  # lines keep their width on the screen, however far away they are
+            lines = self._scene.add_line_segments(
+                "/bodies/lines",
+                points=np.zeros((outboard.size, 2, 3)),
+                colors=_ROD_TONE,
+                line_width=2.5,
+            )
+            self._layers["Bodies"].append(Layer(lines, _lines(inboard[outboard], outboard)))
         self.joint_marks = self._add(
             "Joints",
             bare and few,
@@ -217,7 +225,7 @@ class Scene:
             batched_colors=_MARK_TONE,
         )
         self._layers["Joints"].append(
-            Layer(self.joint_marks, lambda moment: {"positions": moment.joints[:, :3, 3]})
+            Layer(self.joint_marks, lambda moment: {"batched_positions": moment.joints[:, :3, 3]})
         )
 
     def _thickness(self) -> float:
@@ -248,18 +256,18 @@ class Scene:
             )
             self._layers[toggle].append(Layer(handle, self._loads(half)))
 
-    def _loads(self, half: int) -> Callable[[Moment], dict[str, Array]]:
-        def place(moment: Moment) -> dict[str, Array]:
+    def _loads(self, half: int) -> Callable[[Moment], dict[str, Any]]:
+        def place(moment: Moment) -> dict[str, Any]:
             if moment.loads is None:
                 return {}
             vectors = in_world(moment.joints, moment.loads)[half]
             longest = _ARROW_SHARE * self.size * self.arrow_scale
             made = instances(moment.joints[:, :3, 3], vectors, self._largest[half], longest)
             return {
-                "positions": made.positions,
-                "wxyzs": made.quaternions,
-                "scales": made.scales,
-                "colors": made.colors,
+                "batched_positions": made.positions,
+                "batched_wxyzs": made.quaternions,
+                "batched_scales": made.scales,
+                "batched_colors": made.colors,
             }
 
         return place
@@ -312,7 +320,10 @@ def _across(moment: Moment) -> tuple[Array, Array]:
 def _following(links: Any, offsets: Array) -> Callable[[Moment], dict[str, Array]]:
     def place(moment: Moment) -> dict[str, Array]:
         frames = moment.links[links] @ offsets
-        return {"positions": frames[:, :3, 3], "wxyzs": quaternions(frames[:, :3, :3])}
+        return {
+            "batched_positions": frames[:, :3, 3],
+            "batched_wxyzs": quaternions(frames[:, :3, :3]),
+        }
 
     return place
 
@@ -327,10 +338,18 @@ def _spanning(ends: tuple[Any, Any], radius: float) -> Callable[[Moment], dict[s
         along = np.where(length[:, None] > 0, span / np.maximum(length, 1e-300)[:, None], [0, 0, 1])
         scales = np.column_stack([np.full((length.size, 2), radius), np.maximum(length, 1e-9)])
         return {
-            "positions": (here + there) / 2,
-            "wxyzs": turning_z_to(along),
-            "scales": scales,
+            "batched_positions": (here + there) / 2,
+            "batched_wxyzs": turning_z_to(along),
+            "batched_scales": scales,
         }
+
+    return place
+
+
+def _lines(inboard: Any, outboard: Any) -> Callable[[Moment], dict[str, Array]]:
+    def place(moment: Moment) -> dict[str, Array]:
+        points = moment.joints[:, :3, 3]
+        return {"points": np.stack([points[inboard], points[outboard]], axis=1)}
 
     return place
 
