@@ -124,12 +124,20 @@ void Simulation::record_failure(double t, const DynamicsReport& report, const do
   pending_.joint = -1;
   Outcome outcome = report.outcome;
   if (report.ok()) outcome = Outcome::not_finite;
+  // What was given to a joint before what came out at it: one bad torque spoils all accelerations.
+  const auto name_first = [&](const std::vector<double>& given, int first, int n, int j) {
+    for (int i = first; i < first + n && !given.empty(); ++i)
+      if (pending_.joint < 0 && !std::isfinite(given[i])) pending_.joint = j;
+  };
+  for (int j = 0; j < m.n_joints() && report.body < 0; ++j) {
+    name_first(tau_, m.joints[j].v, m.joints[j].nv, j);
+    name_first(external_, 6 * j, 6, j);
+  }
   for (int j = 0; j < m.n_joints() && pending_.joint < 0; ++j) {
     const JointInfo& info = m.joints[j];
     if (report.body >= 0 && info.body == report.body && info.last_of_body) pending_.joint = j;
-    if (report.body < 0)
-      for (int i = 0; i < info.nv; ++i)
-        if (!std::isfinite(du[info.v + i])) pending_.joint = j;
+    for (int i = info.v; i < info.v + info.nv && report.body < 0; ++i)
+      if (!std::isfinite(du[i])) pending_.joint = j;
   }
   pending_.outcome = std::string(to_string(outcome));
   pending_.message = std::string(message(outcome)) + "; " + std::string(remedy(outcome));
