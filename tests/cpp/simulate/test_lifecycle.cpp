@@ -1,0 +1,71 @@
+// Made and thrown away a thousand times: leaks and dangling pointers show under the sanitizers.
+#include <gtest/gtest.h>
+
+#include "linkwise/dynamics/batch.hpp"
+#include "linkwise/solve/registry.hpp"
+#include "simulate/recording.hpp"
+
+namespace linkwise::testing {
+namespace {
+
+constexpr int cycles = 1000;
+
+TEST(Lifecycle, Models) {
+  Draws draws(121);
+  const ModelSpec spec = stacked_spec(draws);
+  for (int i = 0; i < cycles; ++i) {
+    const Model model(deserialize(serialize(spec)));
+    const Model copy = model;
+    ASSERT_EQ(copy.nv(), model.nv());
+  }
+}
+
+TEST(Lifecycle, Methods) {
+  Draws draws(122);
+  const Model model(stacked_spec(draws));
+  const MachineState state = random_state(model, draws);
+  std::vector<double> tau(model.nv()), du(model.nv()), loads(6 * model.n_joints());
+  SweepInput<double> in;
+  in.q = state.q.data();
+  in.v = state.v.data();
+  in.tau = tau.data();
+  for (int i = 0; i < cycles; ++i) {
+    for (const DynamicsEntry& entry : dynamics_table()) {
+      DynamicsOptions options;
+      options.method = entry.name;
+      ASSERT_TRUE(make_dynamics(model, options)->evaluate(0, in, du.data(), loads.data()).ok());
+    }
+    const BatchInput batch{in.q, in.v, in.tau, nullptr, nullptr, 1};
+    ASSERT_EQ(BatchEvaluator(model).forward_dynamics(1, batch, du.data(), nullptr), -1);
+  }
+}
+
+TEST(Lifecycle, SolversByWayOfTheirTable) {
+  Draws draws(123);
+  const Model model(stacked_spec(draws));
+  for (int i = 0; i < cycles; ++i)
+    for (const SolverEntry& entry : solver_table()) {
+      DynamicsOptions options;
+      options.solver = entry.name;
+      ASSERT_NE(make_dynamics(model, options), nullptr);
+    }
+}
+
+TEST(Lifecycle, Simulations) {
+  Draws draws(124);
+  const auto model = make_model(stacked_spec(draws));
+  const MachineState state = random_state(*model, draws);
+  const std::vector<double> at_rest(model->nv());
+  Drive lock;
+  lock.kind = DriveKind::locked;
+  for (int i = 0; i < cycles; ++i)
+    for (const IntegratorEntry& entry : integrator_registry()) {
+      Simulation simulation(model, fixed_step(1e-3, entry.kind));
+      if (i % 2) simulation.set_drive(0, lock);
+      simulation.start(0, state.q.data(), at_rest.data());
+      ASSERT_EQ(run(simulation, {0.0015}).size(), 1u);
+    }
+}
+
+}  // namespace
+}  // namespace linkwise::testing
