@@ -83,13 +83,17 @@ def _chosen(
 
 
 def _recorder(
-    schema: Schema, attrs: Mapping[str, Any], samples: int, output: str | os.PathLike[str] | None
+    model: Model,
+    schema: Schema,
+    attrs: Mapping[str, Any],
+    samples: int,
+    output: str | os.PathLike[str] | None,
 ) -> MemoryRecord | RunWriter:
     if output is None:
         return MemoryRecord(schema, attrs)
     from linkwise.record.store import RunWriter
 
-    return RunWriter(output, schema, attrs, samples=samples)
+    return RunWriter(output, schema, attrs, samples=samples, model=model)
 
 
 def _record(
@@ -243,7 +247,7 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_body)
-    record = _recorder(schema, attrs, sampled.size, output)
+    record = _recorder(model, schema, attrs, sampled.size, output)
     run, ending = _record(simulation, record, schema, sampled, progress)
     if on_failure == "raise":
         raise_failure(model, ending, run)

@@ -60,6 +60,6 @@ def read_model(store: str | os.PathLike[str]) -> Model:
         if array.size > MOST_BYTES:
             raise ValueError("its model is too large")
         return Model.from_bytes(np.asarray(array[:]).tobytes())
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"{shown}: is damaged ({reason}); simulate again") from None

@@ -20,12 +20,15 @@ import numpy as np
 
 from linkwise._core import InputError
 from linkwise.record.claim import check_target, hold, release
+from linkwise.record.machine import write_model
 from linkwise.record.provenance import plain
 from linkwise.record.schema import TIME_ATTRS, Array, Coordinate, Schema, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
     import zarr
+
+    from linkwise._core import Model
 
 # A block of samples is held in memory and rewritten when flushed early; a chunk is one file.
 BLOCK_BYTES = 32 << 20
@@ -69,6 +72,7 @@ class RunWriter:
         attrs: Mapping[str, Any],
         *,
         samples: int,
+        model: Model | None = None,
         flush_seconds: float = FLUSH_SECONDS,
     ) -> None:
         import zarr
@@ -93,6 +97,8 @@ class RunWriter:
         self._lock = hold(aside)
         try:
             self._create(aside, attrs)
+            if model is not None:
+                write_model(aside, model)
             _move_into_place(aside, self.path)
         except BaseException:
             release(self._lock)

@@ -293,6 +293,7 @@ class Scene:
             section_size=5 * cell / 2,
             position=(self.center[0], self.center[1], self._floor()),
             shadow_opacity=0.0,
+            fade_distance=12 * self.size,
             cell_color=(225, 228, 232),
             section_color=(190, 196, 204),
         )

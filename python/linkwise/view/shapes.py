@@ -105,7 +105,7 @@ def unit_arc(sides: int = 6, pieces: int = 28) -> Mesh:
         np.cos(around)[None, :, None] * outward[:, None] - np.sin(around)[None, :, None] * upward
     )
     vertices = 0.5 * outward[:, None] + thick[:, None, None] * spokes
-    return Mesh(vertices.reshape(-1, 3), _bands(len(angle), sides)[:, ::-1])
+    return Mesh(vertices.reshape(-1, 3), _bands(len(angle), sides))
 
 
 def quaternions(rotations: Array) -> Array:

@@ -1,0 +1,115 @@
+"""A short run of the Shuttle's arm, the command line in this process, and a browser."""
+
+import shutil
+import sys
+import threading
+from dataclasses import dataclass
+
+import pytest
+
+import linkwise as lw
+from linkwise import cli
+
+START = (0.0, -0.3, 0.5, -0.2, 0.15, 0.0)
+DURATION = 2.0
+CHROMIUMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# Drawn by the processor: the machines that run tests have no display and no GPU.
+CHROMIUM_ARGUMENTS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+]
+
+
+@pytest.fixture(scope="session")
+def arm():
+    return lw.scenes.srms(payload_mass=100)
+
+
+@pytest.fixture(scope="session")
+def run_path(arm, tmp_path_factory):
+    """A run whose loads and positions change from sample to sample."""
+    path = tmp_path_factory.mktemp("run") / "arm.zarr"
+    lw.simulate(
+        arm,
+        duration=DURATION,
+        every=0.05,
+        q0=START,
+        drives={"shoulder_yaw": 300.0, "elbow_pitch": -200.0},
+        output=path,
+    )
+    return path
+
+
+@dataclass
+class Result:
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def linkwise(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["linkwise", *map(str, arguments)])
+        with pytest.raises(SystemExit) as caught:
+            cli.main()
+        return Result(caught.value.code, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def serve():
+    """Starts the view of a source in a thread; returns its address."""
+    pytest.importorskip("viser", reason="the view needs viser: pip install '.[view]'")
+    from linkwise.view.live import show
+
+    stop, threads = threading.Event(), []
+
+    def start(source):
+        ready, addresses = threading.Event(), []
+
+        def started(address):
+            addresses.append(address)
+            ready.set()
+
+        thread = threading.Thread(
+            target=show,
+            args=(source,),
+            kwargs={
+                "host": "127.0.0.1",
+                "port": 0,
+                "open_browser": False,
+                "started": started,
+                "stop": stop,
+            },
+        )
+        thread.start()
+        threads.append(thread)
+        assert ready.wait(60), "the view did not start"
+        return addresses[0]
+
+    yield start
+    stop.set()
+    for thread in threads:
+        thread.join(30)
+        assert not thread.is_alive()
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """A headless Chromium; where it is missing, what needs it is skipped and says so."""
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="browser tests need playwright: pip install '.[test]'"
+    )
+    executable = next(filter(None, map(shutil.which, CHROMIUMS)), None)
+    if executable is None:
+        pytest.skip("browser tests need Chromium, which is not here: apt-get install chromium")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=executable, args=CHROMIUM_ARGUMENTS)
+        yield browser
+        browser.close()
