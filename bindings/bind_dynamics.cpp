@@ -4,6 +4,7 @@
 #include "arrays.hpp"
 #include "bind.hpp"
 #include "linkwise/dynamics/quantities.hpp"
+#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/forces/passive.hpp"
 #include "linkwise/integrate/integrator.hpp"
 #include "linkwise/solve/registry.hpp"
@@ -111,28 +112,69 @@ Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, cons
   return worst;
 }
 
+/// Runs f(batch, input, first, count) on parts of a batch that end at whole lane groups, so that
+/// the grouping, and with it every bit, is that of one thread. Returns the largest result.
+template <class F>
+int over_threads(const PyModel& self, Scratch& own, size_t count, const BatchInput& in, int threads,
+                 F&& f) {
+  const Model& m = *self.model;
+  constexpr size_t worth_a_thread = 512;  // bodies: some 20 us of work
+  const size_t groups = (count + native_lanes - 1) / native_lanes;
+  const size_t work = count * m.n_bodies() / worth_a_thread + 1;
+  const int parts = static_cast<int>(std::min({static_cast<size_t>(threads), groups, work}));
+  if (parts <= 1) return f(own.batch, in, 0, count);
+  std::vector<int> results(parts);
+  parallel_for(parts, parts, [&](int i) {
+    const size_t first = groups * i / parts * native_lanes;
+    const size_t last = std::min(count, groups * (i + 1) / parts * native_lanes);
+    const auto from = [&](const double* rows, size_t width) {
+      return rows ? rows + first * width : nullptr;
+    };
+    BatchInput part = in;
+    part.q = from(in.q, m.nq());
+    part.v = from(in.v, m.nv());
+    part.tau = from(in.tau, m.nv());
+    part.du = from(in.du, m.nv());
+    part.external = from(in.external, 6 * m.n_joints());
+    PyModel::Lease scratch(self);
+    results[i] = f(scratch->batch, part, first, last - first);
+  });
+  return *std::max_element(results.begin(), results.end());
+}
+
 nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
                             nb::handle external, bool passive, const std::string& method,
                             const std::string& solver, double tolerance, const std::string& stop,
-                            int max_iterations, nb::handle solver_options, bool full) {
+                            int max_iterations, nb::handle solver_options, nb::handle threads,
+                            bool full) {
   const Model& m = *self.model;
   States s(m, q, v, tau, "tau", external);
   check_external(m, s);
   const ForwardOptions asked{method, solver, stop, tolerance, max_iterations, solver_options};
   const bool plain = (method == "auto" || method == "articulated_body") && solver == "auto";
+  const int team = threads_of(threads, s.count * m.n_bodies());
   PyReport report;
-  std::unique_ptr<DynamicsMethod> other;
-  if (plain) {
+  std::unique_ptr<DynamicsMethod> own;
+  DynamicsMethod* other = nullptr;
+  PyModel::Lease scratch(self);
+  if (method == "auto" && plain && s.count == 1 && scratch->piecewise_suits()) {
+    other = &scratch->piecewise(team);
+    report.method = "piecewise";
+    report.solver = "thomas";
+    if (full) report.reason = choose_dynamics(m, dynamics_options(asked)).reason;
+  } else if (plain) {
     report.method = "articulated_body";
     if (full || !solver_options.is_none())
       report.reason = choose_dynamics(m, dynamics_options(asked)).reason;
   } else {
-    const DynamicsOptions options = dynamics_options(asked);
+    DynamicsOptions options = dynamics_options(asked);
+    options.threads = team;
     const Choice choice = choose_dynamics(m, options);
     report.method = choice.method;
     report.solver = choice.solver;
     report.reason = choice.reason;
-    other = make_dynamics(m, options);
+    own = make_dynamics(m, options);
+    other = own.get();
   }
   NewArray du(s.lead, {size(m.nv())});
   std::unique_ptr<NewArray> loads;
@@ -140,7 +182,6 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
   std::vector<double> passive_tau, force;
   Outcome outcome = Outcome::converged;
   {
-    PyModel::Lease scratch(self);
     const nb::gil_scoped_release release;
     const double* total = s.tau.given ? s.tau.data : nullptr;
     if (passive || !total) {
@@ -159,8 +200,12 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
       in.v = s.v.given ? s.v.data : nullptr;
       in.tau = total;
       in.external = s.external.given ? s.external.data : nullptr;
-      const int body =
-          scratch->batch.forward_dynamics(s.count, in, du.data, loads ? loads->data : nullptr);
+      const int body = over_threads(
+          self, *scratch, s.count, in, team,
+          [&](BatchEvaluator& batch, const BatchInput& part, size_t first, size_t count) {
+            return batch.forward_dynamics(count, part, du.data + first * m.nv(),
+                                          loads ? loads->data + first * 6 * m.n_joints() : nullptr);
+          });
       if (body >= 0) {
         outcome = Outcome::not_positive_definite;
         report.body = m.body_name(body);
@@ -192,14 +237,21 @@ nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
   check_external(m, s);
   NewArray out(s.lead, loads ? Shape{size(m.n_joints()), 6} : Shape{size(m.nv())});
   PyModel::Lease scratch(self);
+  const int team_size = threads_of(nb::none(), s.count * m.n_bodies());
   const nb::gil_scoped_release release;
   BatchInput in;
   in.q = s.q.data;
   in.v = s.v.given ? s.v.data : nullptr;
   in.du = s.tau.given ? s.tau.data : nullptr;
   in.external = s.external.given ? s.external.data : nullptr;
-  scratch->batch.inverse_dynamics(s.count, in, loads ? nullptr : out.data,
-                                  loads ? out.data : nullptr);
+  const size_t width = loads ? 6 * m.n_joints() : m.nv();
+  over_threads(self, *scratch, s.count, in, team_size,
+               [&](BatchEvaluator& batch, const BatchInput& part, size_t first, size_t count) {
+                 double* rows = out.data + first * width;
+                 batch.inverse_dynamics(count, part, loads ? nullptr : rows,
+                                        loads ? rows : nullptr);
+                 return 0;
+               });
   const nb::gil_scoped_acquire acquire;
   return nb::cast(out.array);
 }
@@ -208,7 +260,7 @@ nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::hand
                        nb::handle external, bool passive, const std::string& method,
                        const std::string& solver) {
   const nb::object result = forward_dynamics(self, q, v, tau, external, passive, method, solver,
-                                             1e-12, "energy_norm", 0, nb::none(), true);
+                                             1e-12, "energy_norm", 0, nb::none(), nb::none(), true);
   const PyReport& report = nb::cast<PyReport&>(nb::cast<ForwardResult&>(result).report);
   if (report.outcome != "converged")
     throw NumericsError("method " + report.method + ": " + report.outcome +
@@ -309,24 +361,26 @@ void bind_results(nb::module_& m) {
 
 void bind_dynamics(nb::module_& m) {
   bind_results(m);
-  m.def("forward_dynamics", &forward_dynamics, "model"_a, "q"_a, "v"_a, "tau"_a = nb::none(),
-        nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
-        "solver"_a = "auto", "tolerance"_a = 1e-12, "stop"_a = "energy_norm",
-        "max_iterations"_a = 0, "solver_options"_a = nb::none(), "full"_a = false,
-        "Accelerations dv/dt (..., nv) [rad/s2, m/s2] of q (..., nq), v (..., nv), tau (..., nv); "
-        "leading axes broadcast.\n\n"
-        "external (..., n_bodies, 6): wrench [N, N m] on each body at its joint frame's origin, in "
-        "that frame, force\n"
-        "first. passive adds the model's damping, friction, springs and stops to tau. method and "
-        "solver: names as in\n"
-        "linkwise.methods() and linkwise.solvers(), \"auto\" chooses; tolerance, stop and "
-        "max_iterations concern\n"
-        "iterative solvers; solver_options is a dictionary of further ones (keys as in "
-        "linkwise.solver_options()) and goes first.\n"
-        "full returns a ForwardDynamicsResult with joint loads, constraint "
-        "forces and Report.\n"
-        "Raises InputError (a ValueError) on wrong shapes or values, NumericsError when the method "
-        "fails.");
+  m.def(
+      "forward_dynamics", &forward_dynamics, "model"_a, "q"_a, "v"_a, "tau"_a = nb::none(),
+      nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
+      "solver"_a = "auto", "tolerance"_a = 1e-12, "stop"_a = "energy_norm", "max_iterations"_a = 0,
+      "solver_options"_a = nb::none(), "threads"_a = nb::none(), "full"_a = false,
+      "Accelerations dv/dt (..., nv) [rad/s2, m/s2] of q (..., nq), v (..., nv), tau (..., nv); "
+      "leading axes broadcast.\n\n"
+      "external (..., n_bodies, 6): wrench [N, N m] on each body at its joint frame's origin, in "
+      "that frame, force\n"
+      "first. passive adds the model's damping, friction, springs and stops to tau. method and "
+      "solver: names as in\n"
+      "linkwise.methods() and linkwise.solvers(), \"auto\" chooses; tolerance, stop and "
+      "max_iterations concern\n"
+      "iterative solvers; solver_options is a dictionary of further ones (keys as in "
+      "linkwise.solver_options()) and goes first.\n"
+      "threads: by default LINKWISE_THREADS or all cores; the result is the same to the last bit.\n"
+      "full returns a ForwardDynamicsResult with joint loads, constraint "
+      "forces and Report.\n"
+      "Raises InputError (a ValueError) on wrong shapes or values, NumericsError when the method "
+      "fails.");
   m.def(
       "inverse_dynamics",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external) {

@@ -5,6 +5,7 @@
 
 #include "arrays.hpp"
 #include "bind.hpp"
+#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/simulate/simulation.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "py_model.hpp"
@@ -270,8 +271,9 @@ SimulationOptions options_of(const std::string& method, const std::string& solve
                              const std::string& guess, const std::string& stop,
                              nb::handle solver_tolerance, nb::handle max_iterations,
                              nb::handle solver_options, const std::string& integrator,
-                             double tolerance, nb::handle step, nb::handle max_step) {
+                             double tolerance, nb::handle step, nb::handle max_step, int threads) {
   SimulationOptions o;
+  o.dynamics.threads = checked_threads(threads);
   if (!(tolerance > 0) || !std::isfinite(tolerance))
     throw InputError("tolerance must be a positive number; 1e-6 is usual");
   o.dynamics.method = method;
@@ -285,6 +287,7 @@ SimulationOptions options_of(const std::string& method, const std::string& solve
   if (!max_iterations.is_none())
     o.dynamics.solver_options.max_iterations = nb::cast<int>(max_iterations);
   read_solver_options(solver_options, o.dynamics);
+  o.state = state_choice_from_name(state);
   o.integrator = find_integrator(integrator).kind;
   o.integration.tolerance = tolerance;
   if (!step.is_none()) o.integration.step = nb::cast<double>(step);
@@ -301,17 +304,18 @@ void bind_simulation(nb::module_& m) {
           [](PySimulation* self, const PyModel& model, const std::string& method,
              const std::string& solver, const std::string& guess, const std::string& stop,
              nb::object solver_tolerance, nb::object max_iterations, nb::object solver_options,
-             const std::string& integrator, double tolerance, nb::object step, nb::object max_step,
-             nb::object /*threads*/) {
+             const std::string& state, const std::string& integrator, double tolerance,
+             nb::object step, nb::object max_step, nb::object threads) {
             new (self) PySimulation(
                 model, options_of(method, solver, guess, stop, solver_tolerance, max_iterations,
-                                  solver_options, integrator, tolerance, step, max_step));
+                                  solver_options, integrator, tolerance, step, max_step,
+                                  threads_of(threads, 1 << 20)));
           },
           "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto",
           "initial_guess"_a = "cubic", "stop"_a = "energy_norm", "solver_tolerance"_a = nb::none(),
           "max_iterations"_a = nb::none(), "solver_options"_a = nb::none(),
-          "integrator"_a = "adams", "tolerance"_a = 1e-6, "step"_a = nb::none(),
-          "max_step"_a = nb::none(), "threads"_a = nb::none())
+          "state"_a = "joint_rates", "integrator"_a = "adams", "tolerance"_a = 1e-6,
+          "step"_a = nb::none(), "max_step"_a = nb::none(), "threads"_a = nb::none())
       .def("drive_torque", &PySimulation::torque, "joint"_a, "values"_a)
       .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a,
            "interpolation"_a = "linear")
@@ -365,6 +369,9 @@ void bind_simulation(nb::module_& m) {
           "The evaluations so far, one array entry each: simulated time, seconds spent, "
           "iterations, "
           "and whether the step that it ended was accepted.")
+      .def_prop_ro(
+          "velocity_drift", [](const PySimulation& s) { return s.simulation.velocity_drift(); },
+          "State body_velocities: how far joints come apart at the last sample, m/s or rad/s.")
       .def_prop_ro("method", [](const PySimulation& s) { return s.simulation.choice().method; })
       .def_prop_ro("solver", [](const PySimulation& s) { return s.simulation.choice().solver; })
       .def_prop_ro("reason", [](const PySimulation& s) { return s.simulation.choice().reason; });

@@ -266,6 +266,10 @@ class PyEvaluator {
         method_(make_dynamics(*owner.model, options_)) {}
 
   const Choice& choice() const { return choice_; }
+  ArrayOut constraint_force() const {
+    const std::span<const double> f = method_->constraint_force();
+    return to_numpy({f.begin(), f.end()});
+  }
   void reset() { method_ = make_dynamics(*model_, options_); }
 
   nb::tuple evaluate(double t, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
@@ -445,6 +449,8 @@ void bind_evaluator(nb::module_& m) {
            "One evaluation a state (n, ...), all accepted: a dictionary of acceleration (n, nv), "
            "seconds, iterations,\n"
            "error_estimate (n,) and outcome. Shorter when time_limit seconds have passed.")
+      .def_prop_ro("constraint_force", &PyEvaluator::constraint_force, nb::rv_policy::move,
+                   "Unknowns of the last evaluation (size of A,); empty without a solver.")
       .def("reset", &PyEvaluator::reset, "Forget earlier times.")
       .def_prop_ro("method", [](const PyEvaluator& s) { return s.choice().method; })
       .def_prop_ro("solver", [](const PyEvaluator& s) { return s.choice().solver; });

@@ -1,22 +1,53 @@
 #pragma once
 // A Model as Python holds it: the immutable model, and a pool of scratch spaces so that calls from
 // several threads each have one and repeated calls allocate none.
-#include <map>
 #include <memory>
 #include <mutex>
 
+#include <nanobind/nanobind.h>
+
+#include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/batch.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
+#include "linkwise/exec/thread_pool.hpp"
 
 namespace linkwise::bindings {
 
+/// The argument `threads`: None stands for the default, which is not looked up where the work (in
+/// bodies) would not pay for a second thread.
+inline int threads_of(nanobind::handle asked, size_t work) {
+  if (asked.is_none()) return work < 512 ? 1 : default_threads();
+  const int threads = nanobind::cast<int>(asked);
+  if (threads == 0)
+    throw InputError("threads is 0; give a whole number of at least 1, or None for all cores");
+  return checked_threads(threads);
+}
+
 struct Scratch {
-  explicit Scratch(const Model& model) : batch(model) {}
+  explicit Scratch(const Model& model) : batch(model), model_(&model) {}
   BatchEvaluator batch;
   std::unique_ptr<CompositeRigidBody> composite;
-  std::map<std::pair<std::string, std::string>, std::unique_ptr<DynamicsMethod>>
-      methods;  ///< default options
+
+  /// Does "auto" take the piecewise method for one state of this model?
+  bool piecewise_suits() {
+    if (suits_ < 0) suits_ = choose_dynamics(*model_, {}).method == "piecewise";
+    return suits_ > 0;
+  }
+  DynamicsMethod& piecewise(int threads) {
+    if (!piecewise_ || piecewise_threads_ != threads) {
+      DynamicsOptions options;
+      options.method = "piecewise";
+      options.threads = piecewise_threads_ = threads;
+      piecewise_ = make_dynamics(*model_, options);
+    }
+    return *piecewise_;
+  }
+
+ private:
+  const Model* model_;
+  std::unique_ptr<DynamicsMethod> piecewise_;
+  int suits_ = -1, piecewise_threads_ = 0;
 };
 
 class PyModel {

@@ -21,7 +21,8 @@ DynamicsReport ConstraintForce::evaluate(double t, const SweepInput<double>& in,
   guess_->solved(t, f_);
   system_.recover(in, f_, du, loads);
   constexpr double acceptable_violation = 1e-12;
-  if (direct_ && report.ok() && system_.violation() > acceptable_violation) return correct(in, du, loads);
+  if (direct_ && report.ok() && system_.violation() > acceptable_violation)
+    return correct(in, du, loads);
   return report;
 }
 

@@ -19,8 +19,8 @@ class ConstraintForce : public DynamicsMethod {
  private:
   /// Where a light body carries a heavy one, A holds the heavy one's compliance in its last digits
   /// only: the forces come out right, their differences, the accelerations, do not. The torque that
-  /// the accelerations miss (Newton-Euler, which does not suffer) gives their correction through the
-  /// same A, and the loads follow from the corrected motion.
+  /// the accelerations miss (Newton-Euler, which does not suffer) gives their correction through
+  /// the same A, and the loads follow from the corrected motion.
   DynamicsReport correct(const SweepInput<double>& in, double* du, double* loads);
 
   const Model* model_;

@@ -4,6 +4,7 @@
 #include "linkwise/dynamics/articulated_body.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/constraint_force.hpp"
+#include "linkwise/dynamics/piecewise.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
@@ -38,11 +39,19 @@ std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model,
   return std::make_unique<ConstraintForce>(model, options);
 }
 
+std::unique_ptr<DynamicsMethod> make_piecewise(const Model& model, const DynamicsOptions& options) {
+  return std::make_unique<Piecewise>(model, options);
+}
+
 constexpr DynamicsEntry table[] = {
     {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false,
      make_recursion<ArticulatedBody<double>>},
     {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993",
      true, make_constraint_force},
+    {"piecewise",
+     "one long revolute chain in pieces: recursion inside, constraint forces between, on lanes and "
+     "threads",
+     "anderson2000", true, make_piecewise},
     {"composite_rigid_body",
      "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)", "walker1982", false,
      make_recursion<CompositeRigidBody>},
@@ -61,6 +70,9 @@ const DynamicsEntry& find_dynamics(std::string_view name) {
   throw InputError("method '" + std::string(name) + "' is unknown; known: " + known);
 }
 
+/// Shorter chains leave the pieces too short to pay for the cut system: benchmarks/README.md.
+constexpr int piecewise_from = 64;
+
 Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
   Choice choice{options.method, options.solver, "as asked for"};
   if (options.solver != "auto") find_solver(options.solver);
@@ -68,6 +80,10 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
     if (options.solver != "auto") {
       choice.method = "constraint_force";
       choice.reason = "a solver was asked for, and only constraint_force uses one";
+    } else if (model.n_bodies() >= piecewise_from && Piecewise::suits(model)) {
+      choice.method = "piecewise";
+      choice.reason = "a revolute chain of " + std::to_string(model.n_bodies()) +
+                      " bodies: its pieces fill the SIMD lanes";
     } else {
       choice.method = "articulated_body";
       choice.reason = model.singular_body() >= 0

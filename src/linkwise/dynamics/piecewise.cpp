@@ -1,0 +1,312 @@
+#include "linkwise/dynamics/piecewise.hpp"
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/dynamics/piece_kernels.hpp"
+#include "linkwise/exec/thread_pool.hpp"
+#include "linkwise/solve/registry.hpp"
+
+namespace linkwise {
+namespace {
+
+using Group = Lanes<native_lanes>;
+
+HingePlacement<double> placement(const BodyConstants<double>& k) {
+  return {k.cos_alpha, k.sin_alpha, k.a, k.d};
+}
+
+template <class A, class B>
+void set_lanes(A& to, int l, const B& from) {
+  static_assert(sizeof(A) == sizeof(B) * native_lanes);
+  const auto* source = reinterpret_cast<const double*>(&from);
+  auto* target = reinterpret_cast<Group*>(&to);
+  for (size_t i = 0; i < sizeof(B) / sizeof(double); ++i) target[i][l] = source[i];
+}
+template <class B, class A>
+B get_lanes(const A& from, int l) {
+  static_assert(sizeof(A) == sizeof(B) * native_lanes);
+  B to;
+  const auto* source = reinterpret_cast<const Group*>(&from);
+  auto* target = reinterpret_cast<double*>(&to);
+  for (size_t i = 0; i < sizeof(B) / sizeof(double); ++i) target[i] = source[i][l];
+  return to;
+}
+
+}  // namespace
+
+class PiecewiseChain {
+ public:
+  PiecewiseChain(const Model& model, const DynamicsOptions& options)
+      : model_(model),
+        threads_(checked_threads(options.threads)),
+        n_(model.n_bodies()),
+        n_pieces_(Piecewise::pieces(n_)),
+        length_((n_ + n_pieces_ - 1) / n_pieces_),
+        groups_((n_pieces_ + native_lanes - 1) / native_lanes),
+        pose_(n_pieces_),
+        bias_(n_pieces_),
+        solver_(make_solver(
+            options.solver.empty() || options.solver == "auto" ? "thomas" : options.solver,
+            options.solver_options)) {
+    std::vector<int> parent, dim(n_pieces_, cut_rows);
+    for (int s = 0; s < n_pieces_; ++s) parent.push_back(s - 1);
+    A_.set_structure(parent, dim);
+    b_.resize(A_.size());
+    f_.resize(A_.size());
+    for (PieceGroup<Group>& group : groups_) {
+      group.body.resize(length_);
+      group.state.resize(length_);
+    }
+    for (size_t g = 0; g < groups_.size(); ++g)
+      for (int l = 0; l < native_lanes; ++l)
+        for (int k = 0; k < length_; ++k) set_body(g, l, k);
+    for (size_t g = 0; g < groups_.size(); ++g)
+      for (int k = 1; k < length_; ++k) set_skew(static_cast<int>(g), k);
+  }
+
+  DynamicsReport evaluate(const SweepInput<double>& in, double* du, double* loads) {
+    in_ = &in;
+    parallel_for(n_groups(), threads_, [&](int g) {
+      groups_[g].across([&](size_t k) { return gather(in.q, g, k); },
+                        [&](size_t k) { return in.v ? gather(in.v, g, k) : Group{}; });
+    });
+    scan_velocities();
+    parallel_for(n_groups(), threads_, [&](int g) {
+      groups_[g].velocities();
+      add_external(g);
+      for (int k = 0; k < length_; ++k) groups_[g].state[k].torque = gather(in.tau, g, k);
+      groups_[g].tip_to_base();
+    });
+    assemble();
+    DynamicsReport report{solver_->solve(A_, b_, f_)};
+    for (const auto& group : groups_)
+      if (group.failed) report.outcome = Outcome::not_positive_definite;
+    if (!report.ok()) {
+      report.body = report.node >= 0 ? first(report.node) : -1;
+      return report;
+    }
+    spread_forces();
+    parallel_for(n_groups(), threads_, [&](int g) {
+      groups_[g].base_to_tip(
+          [&](size_t k, Group rate) {
+            for (int l = 0; l < native_lanes; ++l)
+              if (const int n = body_at(g, l, static_cast<int>(k)); n < n_) du[n] = rate[l];
+          },
+          loads != nullptr);
+    });
+    cut_rates(du);
+    if (loads)
+      store_joint_loads(
+          model_, in.q, [&](int n) { return load_of(n); }, loads);
+    return report;
+  }
+
+  std::span<const double> constraint_force() const { return f_; }
+
+ private:
+  int n_groups() const { return static_cast<int>(groups_.size()); }
+  int first(int piece) const { return piece * length_; }
+  int body_at(int g, int l, int k) const { return (g * native_lanes + l) * length_ + k; }
+  PieceEnds<Group>& ends(int piece) { return groups_[piece / native_lanes].ends; }
+
+  void set_body(size_t g, int l, int k) {
+    PieceBody<Group>& to = groups_[g].body[k];
+    const int n = body_at(static_cast<int>(g), l, k);
+    if (n >= n_) {  // a massless stand-in: turns with nothing, weighs nothing
+      set_lanes(to.placement, l, HingePlacement<double>{1, 0, 0, 0});
+      to.theta[l] = 0;
+      set_lanes(to.inertia, l, Inertia<double>{});
+      // As the first body of a piece it must have an inertia to invert; nothing feels it.
+      if (k == 0) set_lanes(to.inertia, l, Inertia<double>{1, {}, {{1, 0, 1, 0, 0, 1}}});
+      to.stand_in[l] = 1;
+      return;
+    }
+    const BodyConstants<double>& c = model_.constants[n];
+    set_lanes(to.placement, l, placement(c));
+    to.theta[l] = c.theta;
+    set_lanes(to.inertia, l, c.inertia);
+    to.stand_in[l] = 0;
+  }
+
+  /// Where any lane's joint is no hinge the whole position takes full placements, theta included.
+  void set_skew(int g, int k) {
+    PieceGroup<Group>& group = groups_[g];
+    bool skew = false;
+    for (int l = 0; l < native_lanes; ++l) {
+      const int n = body_at(g, l, k);
+      skew |= n < n_ && model_.topology[n].kind != BodyKind::hinge;
+    }
+    if (!skew) return;
+    group.body[k].skew = static_cast<int>(group.skew.size());
+    Transform<Group> placements;
+    for (int l = 0; l < native_lanes; ++l) {
+      const int n = body_at(g, l, k);
+      set_lanes(
+          placements, l,
+          n < n_ ? model_.constants[n].tree : Transform<double>{Mat3<double>::identity(), {}});
+      group.body[k].theta[l] = 0;
+    }
+    group.skew.push_back(placements);
+  }
+
+  /// values[body] at position k of each piece; bodies and coordinates of a chain are numbered
+  /// alike.
+  Group gather(const double* values, int g, size_t k) const {
+    Group out{};
+    for (int l = 0; l < native_lanes; ++l)
+      if (const int n = body_at(g, l, static_cast<int>(k)); n < n_) out[l] = values[n];
+    return out;
+  }
+
+  void add_external(int g) {
+    if (!in_->external) return;
+    for (int l = 0; l < native_lanes; ++l)
+      for (int k = 0; k < length_; ++k) {
+        const int n = body_at(g, l, k);
+        if (n >= n_) return;
+        Force<double> p = get_lanes<Force<double>>(groups_[g].state[k].p, l);
+        p -= user_wrench(in_->external, model_.joints[n], n);
+        set_lanes(groups_[g].state[k].p, l, p);
+      }
+  }
+
+  /// Velocities of the first bodies, piece after piece, and the geometry of the cut joints.
+  void scan_velocities() {
+    Motion<double> v_last{};
+    for (int s = 0; s < n_pieces_; ++s) {
+      const int n = first(s), l = s % native_lanes;
+      PieceEnds<Group>& e = ends(s);
+      if (n >= n_) {
+        set_lanes(e.v_first, l, Motion<double>{});
+        for (auto& column : e.cut_columns) set_lanes(column, l, Motion<double>{});
+        set_lanes(e.known_outboard, l, Force<double>{});
+        e.first_torque[l] = 0;
+        pose_[s] = {Mat3<double>::identity(), {}};
+        bias_[s] = {};
+        if (s > 0) clear_outboard(s - 1);
+        continue;
+      }
+      const double u = in_->v ? in_->v[n] : 0, tau = in_->tau[n];
+      const BodyConstants<double>& c = model_.constants[n];
+      pose_[s] = RevoluteJoint::pose(c.tree, 0.0, in_->q[n]);
+      Motion<double> v = pose_[s] * v_last;
+      v.ang.z += u;
+      bias_[s] = RevoluteJoint::bias(v, 0.0, u);
+      set_lanes(e.v_first, l, v);
+      e.first_torque[l] = tau;
+      if (s > 0) set_outboard(s - 1, pose_[s], tau);
+      v_last = get_lanes<Transform<double>>(e.across, l) * v;
+      v_last += get_lanes<Motion<double>>(e.relative, l);
+    }
+    clear_outboard(n_pieces_ - 1);
+  }
+
+  /// The inboard body feels -X^T (Q f + z tau) of the next piece's joint.
+  void set_outboard(int s, const Transform<double>& X, double tau) {
+    PieceEnds<Group>& e = ends(s);
+    for (int j = 0; j < cut_rows; ++j) {
+      double unit[6] = {};
+      unit[j] = 1;
+      const Force<double> w = transpose_times(X, to_force(unit));
+      set_lanes(e.cut_columns[j], s % native_lanes, Motion<double>{w.lin, w.ang});
+    }
+    const Force<double> w = transpose_times(X, Force<double>{{}, {0, 0, tau}});
+    set_lanes(e.known_outboard, s % native_lanes, Force<double>{-w.lin, -w.ang});
+  }
+  void clear_outboard(int s) {
+    for (auto& column : ends(s).cut_columns) set_lanes(column, s % native_lanes, Motion<double>{});
+    set_lanes(ends(s).known_outboard, s % native_lanes, Force<double>{});
+  }
+
+  void assemble() {
+    const Motion<double> ground = ground_acceleration<double>(model_, in_->gravity_factor);
+    for (int s = 0; s < n_pieces_; ++s) {
+      const PieceEnds<Group>& e = ends(s);
+      const int l = s % native_lanes;
+      const Motion<double> free = get_lanes<Motion<double>>(e.a_free, l);
+      const Motion<double> from_ground = pose_[s] * ground;
+      const PieceEnds<Group>* in = s > 0 ? &ends(s - 1) : nullptr;
+      const int li = (s + native_lanes - 1) % native_lanes;
+      for (int i = 0; i < cut_rows; ++i) {
+        for (int j = 0; j < cut_rows; ++j)
+          A_.diag[s][block_stride * i + j] =
+              e.QJQ[sym_index(i, j)][l] + (in ? in->PsiJPsi[sym_index(i, j)][li] : 0);
+        b_[cut_rows * s + i] = component(bias_[s], i) - component(free, i) +
+                               (in ? in->beta[i][li] : component(from_ground, i));
+        if (in)
+          for (int j = 0; j < cut_rows; ++j)
+            A_.parent_block[s][block_stride * i + j] = -in->PsiJQ[5 * i + j][li];
+      }
+    }
+  }
+
+  void spread_forces() {
+    for (int s = 0; s < n_pieces_; ++s)
+      for (int j = 0; j < cut_rows; ++j) {
+        ends(s).f_first[j][s % native_lanes] = f_[cut_rows * s + j];
+        ends(s).f_outboard[j][s % native_lanes] =
+            s + 1 < n_pieces_ ? f_[cut_rows * (s + 1) + j] : 0;
+      }
+  }
+
+  void cut_rates(double* du) {
+    Motion<double> a = ground_acceleration<double>(model_, in_->gravity_factor);
+    for (int s = 0; s < n_pieces_ && first(s) < n_; ++s) {
+      const int l = s % native_lanes;
+      du[first(s)] = get_lanes<Motion<double>>(ends(s).a_first, l).ang.z - (pose_[s] * a).ang.z -
+                     bias_[s].ang.z;
+      a = get_lanes<Motion<double>>(ends(s).a_last, l);
+    }
+  }
+
+  Force<double> load_of(int n) const {
+    const int s = n / length_;
+    return get_lanes<Force<double>>(groups_[s / native_lanes].state[n % length_].U,
+                                    s % native_lanes);
+  }
+
+  const Model& model_;
+  int threads_, n_, n_pieces_, length_;
+  std::vector<PieceGroup<Group>> groups_;
+  std::vector<Transform<double>> pose_;  ///< across the cut joints
+  std::vector<Motion<double>> bias_;     ///< c of the cut joints
+  BlockTree A_;
+  std::vector<double> b_, f_;
+  std::unique_ptr<LinearSolver> solver_;
+  const SweepInput<double>* in_ = nullptr;
+};
+
+Piecewise::Piecewise(const Model& model, const DynamicsOptions& options) {
+  if (!suits(model))
+    throw InputError("method piecewise takes a chain of at least " + std::to_string(min_bodies) +
+                     " revolute joints without armature, and model '" + model.spec().name + "'" +
+                     model.where() + " is none; use articulated_body");
+  chain_ = std::make_unique<PiecewiseChain>(model, options);
+}
+
+Piecewise::~Piecewise() = default;
+
+DynamicsReport Piecewise::evaluate(double, const SweepInput<double>& in, double* du,
+                                   double* loads) {
+  return chain_->evaluate(in, du, loads);
+}
+
+std::span<const double> Piecewise::constraint_force() const { return chain_->constraint_force(); }
+
+bool Piecewise::suits(const Model& model) {
+  if (model.n_bodies() < min_bodies || model.n_joints() != model.n_bodies()) return false;
+  for (int n = 0; n < model.n_bodies(); ++n) {
+    const BodyTopology& body = model.topology[n];
+    const bool kind = body.kind == BodyKind::hinge || body.kind == BodyKind::revolute;
+    if (!kind || body.parent != n - 1 || body.q != n) return false;
+  }
+  return model.singular_body() < 0;
+}
+
+int Piecewise::pieces(int n_bodies) {
+  // Eight fill the widest lanes; more only where they are long enough to hide the cut system.
+  int pieces = 8;
+  while (pieces < 1024 && n_bodies / pieces > 128) pieces *= 2;
+  return pieces;
+}
+
+}  // namespace linkwise
