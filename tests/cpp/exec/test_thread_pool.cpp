@@ -1,0 +1,71 @@
+#include <atomic>
+#include <cstdlib>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/exec/thread_pool.hpp"
+
+namespace linkwise {
+namespace {
+
+TEST(ThreadsPool, RunsEveryTaskOnceForAnyNumberOfThreads) {
+  for (int threads : {1, 2, 3, 7})
+    for (int n : {0, 1, 2, 3, 8, 100}) {
+      std::vector<int> runs(n, 0);
+      parallel_for(n, threads, [&](int i) { ++runs[i]; });
+      EXPECT_EQ(runs, std::vector<int>(n, 1)) << n << " tasks on " << threads;
+    }
+}
+
+TEST(ThreadsPool, ManyRegionsInARow) {
+  std::vector<long> sums(4, 0);
+  for (int region = 0; region < 5000; ++region)
+    parallel_for(4, 3, [&](int i) { sums[i] += region; });
+  for (long sum : sums) EXPECT_EQ(sum, 5000L * 4999 / 2);
+}
+
+TEST(ThreadsPool, NestedAndConcurrentRegionsRunInTheirCallers) {
+  std::atomic<int> count{0};
+  const auto nested = [&] {
+    parallel_for(4, 2, [&](int) { parallel_for(3, 2, [&](int) { ++count; }); });
+  };
+  std::vector<std::thread> callers;
+  for (int i = 0; i < 3; ++i) callers.emplace_back(nested);
+  for (std::thread& caller : callers) caller.join();
+  EXPECT_EQ(count, 3 * 4 * 3);
+}
+
+TEST(ThreadsPool, ExceptionsReachTheCallerAndThePoolGoesOn) {
+  const auto fail = [](int i) {
+    if (i == 5) throw std::runtime_error("task 5");
+  };
+  EXPECT_THROW(parallel_for(8, 2, fail), std::runtime_error);
+  std::atomic<int> count{0};
+  parallel_for(8, 2, [&](int) { ++count; });
+  EXPECT_EQ(count, 8);
+}
+
+TEST(ThreadsPool, NumberOfThreadsIsChecked) {
+  EXPECT_EQ(checked_threads(3), 3);
+  EXPECT_THROW(checked_threads(-1), InputError);
+  EXPECT_THROW(checked_threads(max_threads + 1), InputError);
+  EXPECT_GE(default_threads(), 1);
+}
+
+TEST(ThreadsPool, EnvironmentGivesTheDefault) {
+  setenv("LINKWISE_THREADS", "5", 1);
+  EXPECT_EQ(default_threads(), 5);
+  EXPECT_EQ(checked_threads(0), 5);
+  for (const char* bad : {"0", "-2", "two", "3x", "99999"}) {
+    setenv("LINKWISE_THREADS", bad, 1);
+    EXPECT_THROW(default_threads(), InputError) << bad;
+  }
+  unsetenv("LINKWISE_THREADS");
+}
+
+}  // namespace
+}  // namespace linkwise
