@@ -270,8 +270,9 @@ nb::dict trace_columns(const std::vector<EvaluationTrace>& trace) {
 SimulationOptions options_of(const std::string& method, const std::string& solver,
                              const std::string& guess, const std::string& stop,
                              nb::handle solver_tolerance, nb::handle max_iterations,
-                             nb::handle solver_options, const std::string& integrator,
-                             double tolerance, nb::handle step, nb::handle max_step, int threads) {
+                             nb::handle solver_options, const std::string& state,
+                             const std::string& integrator, double tolerance, nb::handle step,
+                             nb::handle max_step, int threads) {
   SimulationOptions o;
   o.dynamics.threads = checked_threads(threads);
   if (!(tolerance > 0) || !std::isfinite(tolerance))
@@ -308,7 +309,7 @@ void bind_simulation(nb::module_& m) {
              nb::object step, nb::object max_step, nb::object threads) {
             new (self) PySimulation(
                 model, options_of(method, solver, guess, stop, solver_tolerance, max_iterations,
-                                  solver_options, integrator, tolerance, step, max_step,
+                                  solver_options, state, integrator, tolerance, step, max_step,
                                   threads_of(threads, 1 << 20)));
           },
           "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto",

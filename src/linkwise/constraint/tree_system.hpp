@@ -5,6 +5,7 @@
 //     A_np = -B_n^T X_n M_p^-1 B_p,   A_ns = B_n^T X_n M_p^-1 X_s^T B_s  (siblings: a hub of the
 //     block tree) b_n  = B_n^T (X_n afree_p + c_n - afree_n) + tau / armature
 // Never solves. Bodies enter by their compliance alone.
+#include <span>
 #include <vector>
 
 #include "linkwise/constraint/joint_constraint.hpp"
@@ -22,9 +23,17 @@ class TreeSystem {
   const std::vector<BodyState<double>>& states() const { return state_; }
 
   void assemble(const SweepInput<double>& in);
+  /// As assemble(), from the bodies' own velocities v [n_bodies]: nothing passes from body to body.
+  /// in.v holds the joint rates that calc_joint_rates() finds.
+  void assemble_at(const SweepInput<double>& in, std::span<const Motion<double>> v);
+  /// u_n = P_n^+ (v_n - X_n v_p) [nv]; returns the largest component of v_n - X_n v_p in a
+  /// constrained direction.
+  double calc_joint_rates(const double* q, std::span<const Motion<double>> v, double* u);
   /// du [nv] from the solution f; loads [n_joints][6] or null.
   void recover(const SweepInput<double>& in, const std::vector<double>& f, double* du,
                double* loads);
+  /// Accelerations of the bodies that recover() found, the ground's being minus gravity.
+  const std::vector<Motion<double>>& accelerations() const { return a_; }
   /// Largest violation of a constraint by the accelerations that recover() found, over the largest
   /// acceleration: what rounding and an inexact f have cost.
   double violation() const { return violation_; }
@@ -34,6 +43,7 @@ class TreeSystem {
  private:
   void calc_constraints();
   void calc_free_accelerations(const SweepInput<double>& in);
+  void assemble_rows(const SweepInput<double>& in);
   void assemble_node(int n, const SweepInput<double>& in);
 
   const Model* model_;

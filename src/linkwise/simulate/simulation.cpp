@@ -9,12 +9,24 @@
 
 namespace linkwise {
 
+StateChoice state_choice_from_name(std::string_view name) {
+  if (name == "joint_rates") return StateChoice::joint_rates;
+  if (name == "body_velocities") return StateChoice::body_velocities;
+  throw InputError("state '" + std::string(name) + "' is unknown; known: joint_rates, " +
+                   "body_velocities");
+}
+
 Simulation::Simulation(std::shared_ptr<const Model> model, SimulationOptions options)
     : model_(std::move(model)),
       options_(std::move(options)),
       choice_(choose_dynamics(*model_, options_.dynamics)),
       drives_(model_->n_joints()) {
   // Made once here so that bad options are refused before anything is written.
+  if (options_.state == StateChoice::body_velocities) {
+    if (options_.dynamics.method == "auto") options_.dynamics.method = "constraint_force";
+    choice_ = choose_dynamics(*model_, options_.dynamics);
+    BodyVelocities(*model_, options_.dynamics);
+  }
   make_dynamics(*model_, options_.dynamics);
   make_integrator(options_.integrator, *this, options_.integration);
 }
@@ -64,7 +76,16 @@ void Simulation::start(double t0, const double* q0, const double* v0) {
   external_.resize(wrenches_.empty() ? 0 : 6 * m.n_joints());
   poses_.resize(world_wrenches_ ? 16 * m.n_joints() : 0);
   y_.assign(q0, q0 + m.nq());
-  y_.insert(y_.end(), v0, v0 + m.nv());
+  body_velocities_.reset();
+  drift_ = 0;
+  if (options_.state == StateChoice::body_velocities) {
+    body_velocities_ = std::make_unique<BodyVelocities>(driven, options_.dynamics);
+    rates_.resize(m.nv());
+    y_.resize(m.nq() + body_velocities_->size());
+    body_velocities_->from_rates(q0, v0, y_.data() + m.nq());
+  } else {
+    y_.insert(y_.end(), v0, v0 + m.nv());
+  }
   for (const Element& e : m.elements) {
     if (e.kind != ElementKind::spherical && e.kind != ElementKind::floating) continue;
     const double* p = &y_[e.q + e.nq - 4];
@@ -81,8 +102,7 @@ void Simulation::start(double t0, const double* q0, const double* v0) {
   integrator_->start(t0, y_);
 }
 
-bool Simulation::accelerations(DynamicsMethod& method, double t, const double* q, const double* v,
-                               double* du, double* loads) {
+SweepInput<double> Simulation::applied_forces(double t, const double* q, const double* v) {
   const Model& m = *model_;
   std::fill(tau_.begin(), tau_.end(), 0.0);
   add_drive_torques(m, drives_, t, q, v, tau_.data());
@@ -98,24 +118,33 @@ bool Simulation::accelerations(DynamicsMethod& method, double t, const double* q
   }
   std::copy(tau_.begin(), tau_.end(), holding_.begin());  // the drives' share, for the record
   add_passive_forces(m, q, v, tau_.data());
-  const bool traced = keeps_trace_ && &method == method_.get();
-  const DynamicsReport report =
-      traced ? traced_evaluation(t, in, du, loads) : method.evaluate(t, in, du, loads);
-  iterations_ += report.iterations;
-  double sum = 0;
-  for (int i = 0; i < m.nv(); ++i) sum += du[i];
-  if (report.ok() && std::isfinite(sum)) return true;
-  record_failure(t, report, du);
-  return false;
+  return in;
 }
 
-DynamicsReport Simulation::traced_evaluation(double t, const SweepInput<double>& in, double* du,
-                                             double* loads) {
+bool Simulation::accelerations(DynamicsMethod& method, double t, const double* q, const double* v,
+                               double* du, double* loads) {
+  const SweepInput<double> in = applied_forces(t, q, v);
+  const auto evaluation = [&] { return method.evaluate(t, in, du, loads); };
+  const bool recorded = keeps_trace_ && &method == method_.get();
+  return accepts(t, recorded ? traced(t, evaluation) : evaluation(), du, model_->nv());
+}
+
+template <class Evaluation>
+DynamicsReport Simulation::traced(double t, Evaluation&& evaluation) {
   const auto started = std::chrono::steady_clock::now();
-  const DynamicsReport report = method_->evaluate(t, in, du, loads);
+  const DynamicsReport report = evaluation();
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started;
   trace_.push_back({t, spent.count(), report.iterations, false});
   return report;
+}
+
+bool Simulation::accepts(double t, const DynamicsReport& report, const double* du, int n) {
+  iterations_ += report.iterations;
+  double sum = 0;
+  for (int i = 0; i < n; ++i) sum += du[i];
+  if (report.ok() && std::isfinite(sum)) return true;
+  record_failure(t, report, du);
+  return false;
 }
 
 void Simulation::record_failure(double t, const DynamicsReport& report, const double* du) {
@@ -146,10 +175,19 @@ void Simulation::record_failure(double t, const DynamicsReport& report, const do
 bool Simulation::evaluate(double t, const double* y, double* ydot) {
   const double *q = y, *v = y + model_->nq();
   position_rates(q, v, ydot);
-  return accelerations(*method_, t, q, v, ydot + model_->nq(), nullptr);
+  double* dv = ydot + model_->nq();
+  if (!body_velocities_) return accelerations(*method_, t, q, v, dv, nullptr);
+  const SweepInput<double> in = applied_forces(t, q, rates_.data());
+  const auto evaluation = [&] { return body_velocities_->evaluate(t, in, v, dv); };
+  const DynamicsReport report = keeps_trace_ ? traced(t, evaluation) : evaluation();
+  return accepts(t, report, dv, body_velocities_->size());
 }
 
 void Simulation::position_rates(const double* q, const double* v, double* qdot) {
+  if (body_velocities_) {
+    body_velocities_->to_rates(q, v, rates_.data());
+    v = rates_.data();
+  }
   for (const Element& e : model_->elements) element_position_rate(e, q, v, qdot);
 }
 
@@ -164,7 +202,10 @@ void Simulation::normalise(double* y) {
 
 void Simulation::accepted(double t, const double*) {
   if (!trace_.empty()) trace_.back().accepted = true;
-  method_->accepted(t);
+  if (body_velocities_)
+    body_velocities_->accepted(t);
+  else
+    method_->accepted(t);
 }
 
 bool Simulation::advance(double t, const Sample& sample) {
@@ -193,6 +234,11 @@ bool Simulation::advance(double t, const Sample& sample) {
 bool Simulation::write_sample(double t, const Sample& s) {
   const Model& m = *model_;
   const double *q = y_.data(), *v = y_.data() + m.nq();
+  if (body_velocities_) {
+    drift_ = body_velocities_->drift(q, v);
+    body_velocities_->to_rates(q, v, rates_.data());
+    v = rates_.data();
+  }
   if (s.position) std::copy(q, q + m.nq(), s.position);
   if (s.velocity) std::copy(v, v + m.nv(), s.velocity);
   if (s.acceleration || s.joint_load || s.drive_torque) {

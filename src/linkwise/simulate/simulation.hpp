@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "linkwise/dynamics/body_velocities.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
 #include "linkwise/dynamics/inverse_dynamics.hpp"
 #include "linkwise/forces/drive.hpp"
@@ -11,8 +12,18 @@
 
 namespace linkwise {
 
+/// What is integrated beside the joint coordinates.
+enum class StateChoice {
+  joint_rates,
+  body_velocities,  ///< the paper's: absolute velocities of the bodies [sharf1993]
+};
+
+/// InputError, listing the known names, when the name is unknown.
+StateChoice state_choice_from_name(std::string_view name);
+
 struct SimulationOptions {
   DynamicsOptions dynamics;
+  StateChoice state = StateChoice::joint_rates;
   IntegratorKind integrator = IntegratorKind::adams;
   IntegratorOptions integration;
 };
@@ -66,21 +77,27 @@ class Simulation : private OdeSystem {
   /// From the next start on, records every evaluation that the integrator asks for.
   void keep_trace(bool wanted) { keeps_trace_ = wanted; }
   const std::vector<EvaluationTrace>& trace() const { return trace_; }
+  /// State body_velocities: how far joints come apart, in m/s or rad/s, at the last sample; else 0.
+  double velocity_drift() const { return drift_; }
 
   const Choice& choice() const { return choice_; }
 
  private:
-  int size() const override { return model_->nq() + model_->nv(); }
+  int size() const override {
+    return model_->nq() + (body_velocities_ ? body_velocities_->size() : model_->nv());
+  }
   int position_size() const override { return model_->nq(); }
   bool evaluate(double t, const double* y, double* ydot) override;
   void position_rates(const double* q, const double* v, double* qdot) override;
   void normalise(double* y) override;
   void accepted(double t, const double* y) override;
 
+  SweepInput<double> applied_forces(double t, const double* q, const double* v);
   bool accelerations(DynamicsMethod& method, double t, const double* q, const double* v, double* du,
                      double* loads);
-  DynamicsReport traced_evaluation(double t, const SweepInput<double>& in, double* du,
-                                   double* loads);
+  template <class Evaluation>
+  DynamicsReport traced(double t, Evaluation&& evaluation);
+  bool accepts(double t, const DynamicsReport& report, const double* du, int n);
   void record_failure(double t, const DynamicsReport& report, const double* du);
   bool write_sample(double t, const Sample& sample);
 
@@ -94,7 +111,9 @@ class Simulation : private OdeSystem {
   std::unique_ptr<DynamicsMethod> method_, output_method_;
   std::unique_ptr<InverseDynamics<double>> inverse_;
   std::unique_ptr<Integrator> integrator_;
-  std::vector<double> tau_, external_, poses_, y_, du_, holding_;
+  std::unique_ptr<BodyVelocities> body_velocities_;
+  std::vector<double> tau_, external_, poses_, y_, du_, holding_, rates_;
+  double drift_ = 0;
   long iterations_ = 0;
   bool keeps_trace_ = false;
   std::vector<EvaluationTrace> trace_;
