@@ -26,7 +26,7 @@ struct Spectrum {
   double radius() const;
 };
 
-/// 2 / (1 + sqrt(1 - mu^2)), mu = 1 - smallest eigenvalue of D^-1 A [hageman1981, eq. (9-3.22)],
+/// 2 / (1 + sqrt(1 - mu^2)), mu = 1 - smallest eigenvalue of D^-1 A [hageman1981, chapter 9],
 /// written so that no digits cancel when mu is near 1.
 double optimal_relaxation(double smallest_eigenvalue);
 

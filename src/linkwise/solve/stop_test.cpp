@@ -7,6 +7,11 @@
 #include "linkwise/linear/vector.hpp"
 
 namespace linkwise {
+namespace {
+
+constexpr double unseen_condition = 1e8;
+
+}  // namespace
 
 void StopTest::start(const SolverOptions& options, const ScaledTree* scaling, int max_iterations) {
   estimate_.start(0.0);
@@ -58,8 +63,23 @@ double StopTest::relative_error() const {
 // of about three.
 double StopTest::calc_squared_error(const IterationStep& step) const {
   if (step.squared_error >= 0.0) return step.squared_error;
+  const double tail = estimate_.squared_error();
+  // No contraction seen yet: only a change that would do even if the slowest mode were 1e8 times
+  // slower than what the iteration has met tells anything. It accepts a guess that is exact
+  // already.
+  if (!std::isfinite(tail))
+    return unseen_condition * std::max(std::abs(step.decrease), step.squared_bound);
   const double share = correcting_ ? 1.0 : 0.25;
-  return std::max(estimate_.squared_error(), share * step.squared_bound);
+  return std::max(tail, share * step.squared_bound);
+}
+
+bool StopTest::accepts_start(double preconditioned_square) {
+  if (rule_ != StopRule::energy_norm || correcting_) return false;
+  const double square = unseen_condition * preconditioned_square;
+  if (!(square <= energy_bound() * energy_bound())) return false;
+  outcome_ = Outcome::converged;
+  squared_error_ = square;
+  return true;
 }
 
 bool StopTest::meets_energy_rule(const IterationStep& step) const {

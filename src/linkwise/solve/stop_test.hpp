@@ -36,6 +36,9 @@ class StopTest {
   /// Norm of the right-hand side, for the residual rule.
   void set_right_hand_side(std::span<const double> b);
 
+  /// Is a guess with a residual of this square, in the norm of the preconditioner's inverse, good
+  /// enough as it is?
+  bool accepts_start(double preconditioned_square);
   /// Counts an iteration; true when the solver has to stop, with outcome() telling why.
   bool stops(const IterationStep& step);
   /// The solver stops on its own account; `converged` when there is nothing left to improve.

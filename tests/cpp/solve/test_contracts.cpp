@@ -175,12 +175,30 @@ TEST_P(EverySolver, NotANumberIsNotIndefinite) {
   }
 }
 
+TEST_P(EverySolver, AnExactGuessIsAccepted) {
+  for (Shape shape : shapes) {
+    const BlockTree tree = random_tree(shape, Dims::five, 9, 5);
+    if (!takes(tree)) continue;
+    const Dense dense = dense_twin(tree);
+    const std::vector<double> b = random_vector(tree.size(), 1);
+    const std::vector<double> exact = cholesky_solve(dense, b);
+    for (double off : {0.0, 1e-16, 1e-15, 1e-13}) {
+      std::vector<double> x = exact;
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] *= 1.0 + off * static_cast<double>(i % 3);
+      const Report report = entry().make({})->solve(tree, b, x);
+      EXPECT_TRUE(report.ok()) << to_string(report.outcome) << ' ' << off;
+      EXPECT_LE(report.iterations, 2);
+      EXPECT_LE(energy_error(dense, x, exact), 1e-11);
+    }
+  }
+}
+
 TEST_P(EverySolver, AUselessGuessDoesNoHarm) {
   const BlockTree tree = random_tree(Shape::chain, Dims::five, 9, 5);
   const Dense dense = dense_twin(tree);
   const std::vector<double> b = random_vector(tree.size(), 1);
   const std::vector<double> exact = cholesky_solve(dense, b);
-  for (double guess : {1e6, std::numeric_limits<double>::quiet_NaN()}) {
+  for (double guess : {1e6, 1e15, std::numeric_limits<double>::quiet_NaN()}) {
     std::vector<double> x(tree.size(), guess);
     ASSERT_TRUE(entry().make({})->solve(tree, b, x).ok());
     EXPECT_LE(energy_error(dense, x, exact), 3e-7);

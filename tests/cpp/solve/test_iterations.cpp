@@ -44,7 +44,7 @@ Dense iteration_matrix(const char* name, const BlockTree& tree, const SolverOpti
   return g;
 }
 
-/// lim |G^k|^(1/k) by repeated squaring [gelfand's formula].
+/// lim |G^k|^(1/k) by repeated squaring (Gelfand's formula).
 double spectral_radius(Dense g) {
   const int n = g.size, squarings = 13;
   double logarithm = 0.0, power = 1.0;

@@ -1,4 +1,4 @@
-// Twisted block elimination ("burn at both ends", [babuska1972]): the recurrence of block Thomas
+// Twisted block elimination [babuska1972]: the recurrence of block Thomas
 // from the tip inboard and the same from the base outboard, until they meet in the middle node. The
 // two are independent of each other: two threads, or the two halves of one core's pipeline, run
 // them at once.

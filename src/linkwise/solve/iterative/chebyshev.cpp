@@ -2,7 +2,7 @@
 //     f+ = rho+ (g z + f) + (1 - rho+) f-,   z = D^-1 (b - A f),
 //     rho_1 = 1,  rho_2 = 1 / (1 - s^2 / 2),  rho+ = 1 / (1 - s^2 rho / 4).
 // With the eigenvalues of D^-1 A in [a, c]: g = 2 / (a + c), s = (c - a) / (c + a) [hageman1981,
-// section 4.2]. Along a chain the spectrum is symmetric about 1, so that g = 1 and s is the
+// chapter 4]. Along a chain the spectrum is symmetric about 1, so that g = 1 and s is the
 // spectral radius of Jacobi's iteration, the paper's form; a hub can have c > 2, where Jacobi
 // itself diverges.
 
@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "linkwise/linear/vector.hpp"
 #include "linkwise/solve/iterative/iterative_solver.hpp"
@@ -58,10 +57,11 @@ double Chebyshev::calc_squared_error(double change_square) {
   last_changes_[2] = last_changes_[1];
   last_changes_[1] = last_changes_[0];
   last_changes_[0] = change_square;
-  if (change_square == 0.0) return 0.0;
-  if (oldest == 0.0) return std::numeric_limits<double>::infinity();
+  // Until a contraction shows, only a change at rounding level is taken for convergence.
+  constexpr double unseen_condition = 1e8;
+  if (oldest == 0.0) return unseen_condition * change_square;
   const double rate = std::max(contraction_, std::pow(change_square / oldest, 1.0 / 6.0));
-  if (!(rate < 1.0)) return std::numeric_limits<double>::infinity();
+  if (!(rate < 1.0)) return unseen_condition * change_square;
   return change_square * rate * rate / ((1.0 - rate) * (1.0 - rate));
 }
 

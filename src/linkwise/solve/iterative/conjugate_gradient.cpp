@@ -9,6 +9,8 @@
 
 #include "linkwise/solve/iterative/conjugate_gradient.hpp"
 
+#include <algorithm>
+
 #include "linkwise/solve/iterative/iterative_solver.hpp"
 #include "linkwise/solve/iterative/krylov.hpp"
 
@@ -43,10 +45,16 @@ void ConjugateGradient::three_term(std::span<const double> b, std::span<double> 
   std::span<double> z = work_.r, z_previous = work_.p, az = work_.q;
   multiply(x, z);
   subtract_from(b, z);
-  const double known_energy = dot(x, b) + dot(x, z);
+  double known_energy = dot(x, b) + dot(x, z);
+  if (known_energy < 0.0) {
+    std::fill(x.begin(), x.end(), 0.0);
+    std::copy(b.begin(), b.end(), z.begin());
+    known_energy = 0.0;
+  }
   stop.set_solution_energy(known_energy);
   double zz = sum_of_squares(z), zz_previous = 0.0, gamma_previous = 0.0, rho = 1.0, share = 1.0;
   const double first_zz = zz;
+  if (stop.accepts_start(zz)) return;
   double step = 0.0;
   SmallestRitz ritz;
   for (bool first = true;; first = false) {

@@ -2,6 +2,7 @@
 // Preconditioned conjugate gradients, two-term [hestenes1952], for any operator and preconditioner;
 // and the smallest eigenvalue that they have seen.
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -76,12 +77,20 @@ void conjugate_gradients(std::span<const double> b, std::span<double> x, StopTes
     multiply(std::span<const double>(x), r);
     subtract_from(b, r);
   }
-  // ||x*||^2 - ||x* - x0||^2 = x0^T (b + r0)  [strakos2002, eq. (3.10)]
-  const double known_energy = other_energy + dot(x, b) + dot(x, r);
+  // ||x*||^2 - ||x* - x0||^2 = x0^T (b + r0)  [strakos2002]
+  double known_energy = dot(x, b) + dot(x, r);
+  if (known_energy < 0.0) {
+    // Zero is closer to the solution than the guess, whose rounding errors would remain.
+    std::fill(x.begin(), x.end(), 0.0);
+    std::copy(b.begin(), b.end(), r.begin());
+    known_energy = 0.0;
+  }
+  known_energy += other_energy;
   stop.set_solution_energy(known_energy);
   std::span<const double> z = precondition(std::span<const double>(r), std::span<double>(work.z));
   double rz = dot(r, z), growth = 0.0;
   const double first_rz = rz;
+  if (stop.accepts_start(rz)) return;
   double share = 1.0;  // (z, r) / (p, M p)
   SmallestRitz ritz;
   bool first = true;

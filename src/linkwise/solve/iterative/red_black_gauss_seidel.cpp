@@ -1,6 +1,6 @@
 // Block Gauss-Seidel, all red nodes at once and then all black ones. Along a chain this is the same
-// consistently ordered matrix in another order, with the same asymptotic rate [hageman1981, section
-// 9.2] - and fully parallel, although [sharf1993] counts Gauss-Seidel as sequential. Joints of a
+// consistently ordered matrix in another order, with the same asymptotic rate [hageman1981, chapter
+// 9] - and fully parallel, although [sharf1993] counts Gauss-Seidel as sequential. Joints of a
 // hub need a colour each.
 
 #include "linkwise/solve/iterative/red_black_gauss_seidel.hpp"

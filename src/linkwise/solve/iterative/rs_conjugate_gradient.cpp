@@ -1,4 +1,4 @@
-// Conjugate gradients on the reduced system (RS-CG of [hageman1981], section 8.2).
+// Conjugate gradients on the reduced system (RS-CG of [hageman1981], chapter 8).
 //
 // Red nodes do not couple with each other, so they are eliminated exactly: on A~ with unit diagonal
 //     S x_B = b_B - A_BR b_R,   S = A_BB - A_BR A_RB,   x_R = b_R - A_RB x_B.

@@ -1,7 +1,7 @@
 // The factor is given, or optimal for the spectral radius mu of Jacobi's iteration, or adaptive.
 //
 // Along a chain A is consistently ordered and mu and the radius lambda of the sweep at omega are
-// tied by (lambda + omega - 1)^2 = lambda omega^2 mu^2 [hageman1981, eq. (9-3.10)]; the best omega,
+// tied by (lambda + omega - 1)^2 = lambda omega^2 mu^2 [hageman1981, chapter 9]; the best omega,
 // 2 / (1 + sqrt(1 - mu^2)), makes lambda = omega - 1. A hub breaks the relation. The sweep
 // converges for every omega in (0, 2) still, but the more joints a body has, the less
 // over-relaxation it takes: with c the largest eigenvalue of D^-1 A, which is below 2 on chains,
@@ -46,7 +46,7 @@ double SuccessiveOverRelaxation::relaxation_factor(double change, double previou
   return omega_;
 }
 
-// The adaptive procedure of [hageman1981, section 9.5] in its essentials. While omega is below its
+// The adaptive procedure of [hageman1981, chapter 9] in its essentials. While omega is below its
 // optimum the changes shrink by the sweep's radius lambda, real and above omega - 1, and lambda
 // tells mu, hence a better omega. Two guards: the ratio must have settled, which after a change of
 // omega takes until p (omega - 1)^(p - 1) is small; and it must be clearly slower than an optimal
