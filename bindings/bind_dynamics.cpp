@@ -23,21 +23,22 @@ size_t size(int n) { return static_cast<size_t>(n); }
 
 /// q, v, tau and external wrenches with their leading axes broadcast.
 struct States {
-  Argument q, v, tau, external;
+  Argument q, v, tau, external, prescribed;
   Shape lead;
   size_t count;
   std::vector<double> tau_zero;
 
   States(const Model& m, nb::handle q_, nb::handle v_, nb::handle tau_, const char* tau_name,
-         nb::handle external_)
+         nb::handle external_, nb::handle prescribed_ = nb::none())
       : q("q", {size(m.nq())}, q_),
         v("v", {size(m.nv())}, v_),
         tau(tau_name, {size(m.nv())}, tau_),
-        external("external", {size(m.n_joints()), 6}, external_) {
+        external("external", {size(m.n_joints()), 6}, external_),
+        prescribed("prescribed", {size(m.nv())}, prescribed_) {
     if (!q.given)
       throw InputError("q is missing; give an array of shape (..., " + std::to_string(m.nq()) +
                        ")");
-    lead = broadcast_leading({&q, &v, &tau, &external});
+    lead = broadcast_leading({&q, &v, &tau, &external, &prescribed});
     count = product(lead);
   }
 };
@@ -68,6 +69,11 @@ std::vector<double> with_passive(const Model& m, const States& s) {
   return tau;
 }
 
+void check_gravity(double factor) {
+  if (!std::isfinite(factor))
+    throw InputError("gravity is not finite; give a factor, 1 for the model's gravity, 0 for none");
+}
+
 struct ForwardOptions {
   std::string method, solver, stop;
   double tolerance;
@@ -88,7 +94,8 @@ DynamicsOptions dynamics_options(const ForwardOptions& o) {
 
 /// Runs the chosen method on every system; force is [count][unknowns] when wanted.
 Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, const double* tau,
-                   double* du, double* loads, std::vector<double>* force, PyReport& report) {
+                   double gravity, double* du, double* loads, std::vector<double>* force,
+                   PyReport& report) {
   Outcome worst = Outcome::converged;
   std::vector<double> zero(m.nv());
   for (size_t i = 0; i < s.count; ++i) {
@@ -97,6 +104,8 @@ Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, cons
     in.v = s.v.given ? s.v.data + i * m.nv() : zero.data();
     in.tau = tau ? tau + i * m.nv() : zero.data();
     in.external = s.external.given ? s.external.data + i * 6 * m.n_joints() : nullptr;
+    in.prescribed = s.prescribed.given ? s.prescribed.data + i * m.nv() : zero.data();
+    in.gravity_factor = gravity;
     const DynamicsReport r =
         method.evaluate(0, in, du + i * m.nv(), loads ? loads + i * 6 * m.n_joints() : nullptr);
     report.iterations = std::max(report.iterations, r.iterations);
@@ -146,10 +155,14 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
                             nb::handle external, bool passive, const std::string& method,
                             const std::string& solver, double tolerance, const std::string& stop,
                             int max_iterations, nb::handle solver_options, nb::handle threads,
-                            bool full) {
+                            bool full, double gravity, nb::handle prescribed) {
   const Model& m = *self.model;
-  States s(m, q, v, tau, "tau", external);
+  States s(m, q, v, tau, "tau", external, prescribed);
   check_external(m, s);
+  check_gravity(gravity);
+  if (s.prescribed.given && m.spec().prescribed.empty())
+    throw InputError(
+        "prescribed: the model has no joint of given motion; use model.prescribe([...])");
   const ForwardOptions asked{method, solver, stop, tolerance, max_iterations, solver_options};
   const bool plain = (method == "auto" || method == "articulated_body") && solver == "auto";
   const int team = threads_of(threads, s.count * m.n_bodies());
@@ -192,7 +205,7 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
       if (!passive_tau.empty()) total = passive_tau.data();
     }
     if (other) {
-      outcome = run_method(m, *other, s, total, du.data, loads ? loads->data : nullptr,
+      outcome = run_method(m, *other, s, total, gravity, du.data, loads ? loads->data : nullptr,
                            full ? &force : nullptr, report);
     } else {
       BatchInput in;
@@ -200,6 +213,8 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
       in.v = s.v.given ? s.v.data : nullptr;
       in.tau = total;
       in.external = s.external.given ? s.external.data : nullptr;
+      in.du = s.prescribed.given ? s.prescribed.data : nullptr;
+      in.gravity_factor = gravity;
       const int body = over_threads(
           self, *scratch, s.count, in, team,
           [&](BatchEvaluator& batch, const BatchInput& part, size_t first, size_t count) {
@@ -231,10 +246,11 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
 }
 
 nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle a,
-                            nb::handle external, bool loads) {
+                            nb::handle external, double gravity, bool loads) {
   const Model& m = *self.model;
   States s(m, q, v, a, "acceleration", external);
   check_external(m, s);
+  check_gravity(gravity);
   NewArray out(s.lead, loads ? Shape{size(m.n_joints()), 6} : Shape{size(m.nv())});
   PyModel::Lease scratch(self);
   const int team_size = threads_of(nb::none(), s.count * m.n_bodies());
@@ -244,6 +260,7 @@ nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
   in.v = s.v.given ? s.v.data : nullptr;
   in.du = s.tau.given ? s.tau.data : nullptr;
   in.external = s.external.given ? s.external.data : nullptr;
+  in.gravity_factor = gravity;
   const size_t width = loads ? 6 * m.n_joints() : m.nv();
   over_threads(self, *scratch, s.count, in, team_size,
                [&](BatchEvaluator& batch, const BatchInput& part, size_t first, size_t count) {
@@ -259,8 +276,9 @@ nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
 nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
                        nb::handle external, bool passive, const std::string& method,
                        const std::string& solver) {
-  const nb::object result = forward_dynamics(self, q, v, tau, external, passive, method, solver,
-                                             1e-12, "energy_norm", 0, nb::none(), nb::none(), true);
+  const nb::object result =
+      forward_dynamics(self, q, v, tau, external, passive, method, solver, 1e-12, "energy_norm", 0,
+                       nb::none(), nb::none(), true, 1.0, nb::none());
   const PyReport& report = nb::cast<PyReport&>(nb::cast<ForwardResult&>(result).report);
   if (report.outcome != "converged")
     throw NumericsError("method " + report.method + ": " + report.outcome +
@@ -362,10 +380,11 @@ void bind_results(nb::module_& m) {
 void bind_dynamics(nb::module_& m) {
   bind_results(m);
   m.def(
-      "forward_dynamics", &forward_dynamics, "model"_a, "q"_a, "v"_a, "tau"_a = nb::none(),
+      "forward_dynamics", &forward_dynamics, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
       nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
       "solver"_a = "auto", "tolerance"_a = 1e-12, "stop"_a = "energy_norm", "max_iterations"_a = 0,
       "solver_options"_a = nb::none(), "threads"_a = nb::none(), "full"_a = false,
+      "gravity"_a = 1.0, "prescribed"_a = nb::none(),
       "Accelerations dv/dt (..., nv) [rad/s2, m/s2] of q (..., nq), v (..., nv), tau (..., nv); "
       "leading axes broadcast.\n\n"
       "external (..., n_bodies, 6): wrench [N, N m] on each body at its joint frame's origin, in "
@@ -379,31 +398,49 @@ void bind_dynamics(nb::module_& m) {
       "threads: by default LINKWISE_THREADS or all cores; the result is the same to the last bit.\n"
       "full returns a ForwardDynamicsResult with joint loads, constraint "
       "forces and Report.\n"
+      "gravity multiplies the model's gravity, 0 leaves it out; prescribed (..., nv) holds the "
+      "accelerations of the joints\n"
+      "of model.prescribe, the other entries are not read.\n"
       "Raises InputError (a ValueError) on wrong shapes or values, NumericsError when the method "
       "fails.");
   m.def(
       "inverse_dynamics",
-      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external) {
-        return inverse_dynamics(self, q, v, a, external, false);
-      },
-      "model"_a, "q"_a, "v"_a, "acceleration"_a, nb::kw_only(), "external"_a = nb::none(),
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
+         double gravity) { return inverse_dynamics(self, q, v, a, external, gravity, false); },
+      "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
+      "external"_a = nb::none(), "gravity"_a = 1.0,
       "tau (..., nv) [N m, N] that gives the acceleration (..., nv) at q, v: Newton-Euler "
       "recursion, armature included.");
   m.def(
       "inverse_dynamics_loads",
-      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external) {
-        return inverse_dynamics(self, q, v, a, external, true);
-      },
-      "model"_a, "q"_a, "v"_a, "acceleration"_a, nb::kw_only(), "external"_a = nb::none(),
-      "Joint loads (..., n_joints, 6) of a given motion, frames and signs as in joint_loads.");
-  m.def("joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a, "tau"_a = nb::none(), nb::kw_only(),
-        "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto", "solver"_a = "auto",
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
+         double gravity) { return inverse_dynamics(self, q, v, a, external, gravity, true); },
+      "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
+      "external"_a = nb::none(), "gravity"_a = 1.0,
+      "Joint loads (..., n_joints, 6) of a given motion, frames and signs as in joint_loads; "
+      "gravity "
+      "multiplies the\n"
+      "model's gravity.");
+  m.def("joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
+        nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
+        "solver"_a = "auto",
         "Joint loads (..., n_joints, 6) [N, N m] of the motion that tau causes: the wrench that "
         "the inboard body exerts on\n"
         "the outboard body through the joint, at the joint point, in the joint's outboard frame, "
         "force first.");
   m.def("mass_matrix", &mass_matrix, "model"_a, "q"_a,
         "Joint-space mass matrix (..., nv, nv), armature included.");
+  m.def(
+      "passive_torque",
+      [](const PyModel& self, nb::handle q, nb::handle v) {
+        return map_states(self, q, v, {size(self.model->nv())},
+                          [](const Model& m, const double* q, const double* v, double* out) {
+                            std::fill(out, out + m.nv(), 0.0);
+                            add_passive_forces(m, q, v, out);
+                          });
+      },
+      "model"_a, "q"_a, "v"_a,
+      "Torque (..., nv) [N m, N] of the joints' own damping, friction, springs and stops.");
   m.def(
       "kinetic_energy",
       [](const PyModel& self, nb::handle q, nb::handle v) {

@@ -58,6 +58,57 @@ std::vector<double> values_of(nb::handle value, const char* name) {
   return {a.data(), a.data() + a.size()};
 }
 
+LinkSpec link_spec(std::string name, double mass, nb::handle com, nb::handle inertia) {
+  LinkSpec link;
+  link.name = std::move(name);
+  link.mass = mass;
+  if (!com.is_none()) link.com = vec3(com, "com");
+  if (!inertia.is_none()) {
+    const Mat3<double> I = mat3(inertia, "inertia");
+    double scale = 0;
+    for (double x : I.m) scale = std::max(scale, std::abs(x));
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < i; ++j)
+        if (std::abs(I.m[3 * i + j] - I.m[3 * j + i]) > 1e-9 * scale)
+          throw InputError("link '" + link.name +
+                           "': inertia is not symmetric; give a symmetric 3x3 matrix");
+    link.inertia = {{I.m[0], I.m[3], I.m[4], I.m[6], I.m[7], I.m[8]}};
+  }
+  return link;
+}
+
+/// The same machine with a body welded to one of its links.
+PyModel* with_payload(const PyModel& self, const std::string& link, double mass, nb::handle com,
+                      nb::handle inertia, const std::string& name) {
+  ModelSpec spec = self.model->spec();
+  self.model->link_index(link);
+  spec.links.push_back(link_spec(name, mass, com, inertia));
+  JointSpec weld;
+  weld.name = name + "_mount";
+  weld.type = JointType::fixed;
+  weld.parent = link;
+  weld.child = name;
+  weld.axes.push_back({});
+  spec.joints.push_back(std::move(weld));
+  return new PyModel(std::move(spec));
+}
+
+/// The same machine with other inertial data of one link; what is None stays.
+PyModel* with_link(const PyModel& self, const std::string& link, nb::handle mass, nb::handle com,
+                   nb::handle inertia) {
+  ModelSpec spec = self.model->spec();
+  self.model->link_index(link);
+  for (LinkSpec& old : spec.links) {
+    if (old.name != link) continue;
+    const LinkSpec given =
+        link_spec(link, mass.is_none() ? old.mass : nb::cast<double>(mass), com, inertia);
+    old.mass = given.mass;
+    if (!com.is_none()) old.com = given.com;
+    if (!inertia.is_none()) old.inertia = given.inertia;
+  }
+  return new PyModel(std::move(spec));
+}
+
 class ModelBuilder {
  public:
   ModelBuilder(std::string name, nb::handle gravity, std::string source) {
@@ -67,22 +118,7 @@ class ModelBuilder {
   }
 
   void add_link(std::string name, double mass, nb::handle com, nb::handle inertia) {
-    LinkSpec link;
-    link.name = std::move(name);
-    link.mass = mass;
-    if (!com.is_none()) link.com = vec3(com, "com");
-    if (!inertia.is_none()) {
-      const Mat3<double> I = mat3(inertia, "inertia");
-      double scale = 0;
-      for (double x : I.m) scale = std::max(scale, std::abs(x));
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < i; ++j)
-          if (std::abs(I.m[3 * i + j] - I.m[3 * j + i]) > 1e-9 * scale)
-            throw InputError("link '" + link.name +
-                             "': inertia is not symmetric; give a symmetric 3x3 matrix");
-      link.inertia = {{I.m[0], I.m[3], I.m[4], I.m[6], I.m[7], I.m[8]}};
-    }
-    spec.links.push_back(std::move(link));
+    spec.links.push_back(link_spec(std::move(name), mass, com, inertia));
   }
 
   void add_joint(std::string name, const std::string& type, std::string parent, std::string child,
@@ -431,6 +467,30 @@ void bind_model(nb::module_& m) {
             return slice_of(j.v, j.nv);
           },
           "joint"_a, "Where the joint's rates are in v, tau and accelerations.")
+      .def(
+          "prescribe",
+          [](const PyModel& s, const std::vector<std::string>& names) {
+            ModelSpec spec = s.model->spec();
+            for (const std::string& name : names) {
+              s.model->joint_index(name);
+              spec.prescribed.push_back(name);
+            }
+            return new PyModel(std::move(spec));
+          },
+          "joints"_a, nb::rv_policy::take_ownership,
+          "The same machine with the motion of these joints given: forward_dynamics takes their "
+          "accelerations\n"
+          "(prescribed=) and finds those of the others.")
+      .def("with_payload", &with_payload, "link"_a, nb::kw_only(), "mass"_a, "com"_a = nb::none(),
+           "inertia"_a = nb::none(), "name"_a = "payload", nb::rv_policy::take_ownership,
+           "The same machine with a body welded to a link: mass [kg], centre of mass [m] and "
+           "inertia about it\n"
+           "[kg m2] in that link's frame.")
+      .def("with_link", &with_link, "link"_a, nb::kw_only(), "mass"_a = nb::none(),
+           "com"_a = nb::none(), "inertia"_a = nb::none(), nb::rv_policy::take_ownership,
+           "The same machine with another mass [kg], centre of mass [m] or inertia about it "
+           "[kg m2] of one link;\n"
+           "what is None stays.")
       .def_prop_ro(
           "total_mass", [](const PyModel& s) { return s.model->total_mass(); },
           "Mass of the moving bodies, kg.")

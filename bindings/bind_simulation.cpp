@@ -124,6 +124,34 @@ class PySimulation {
     };
     simulation.set_drive(j, std::move(d));
   }
+  void motion_table(const std::string& name, nb::handle times, nb::handle values,
+                    const std::string& interpolation) {
+    const int j = joint(name);
+    if (interpolation == "linear")
+      throw InputError("joint '" + name +
+                       "': the velocity of a linear table jumps at every row; use cubic");
+    Drive d;
+    d.kind = DriveKind::motion;
+    d.table = make_table(times, values, interpolation, width(j));
+    simulation.set_drive(j, std::move(d));
+  }
+  void motion_callable(const std::string& name, nb::callable fn) {
+    const int j = joint(name);
+    Drive d;
+    d.kind = DriveKind::motion;
+    d.motion = [fn, name, nv = width(j)](double t, double* q, double* v, double* a) {
+      const nb::gil_scoped_acquire acquire;
+      const nb::object returned = fn(t);
+      if (!nb::isinstance<nb::sequence>(returned) || nb::len(returned) != 3)
+        throw InputError("motion returned for joint '" + name +
+                         "' is not three values; return position, rate and acceleration");
+      double* out[3] = {q, v, a};
+      const char* what[3] = {"position", "rate", "acceleration"};
+      for (int k = 0; k < 3; ++k)
+        store(returned[k], std::string(what[k]) + " returned for joint '" + name + "'", out[k], nv);
+    };
+    simulation.set_drive(j, std::move(d));
+  }
   void pd(const std::string& name, double kp, double kd, nb::handle target) {
     const int j = joint(name);
     Drive d = gains(name, kp, kd);
@@ -198,6 +226,7 @@ nb::dict PySimulation::advance(nb::handle times_in, const nb::object& quantities
   auto position = column("position", {nq}), velocity = column("velocity", {nv}),
        acceleration = column("acceleration", {nv});
   auto load = column("joint_load", {nj, 6}), torque = column("drive_torque", {nv});
+  auto external = column("external_wrench", {nj, 6});
   auto kinetic = column("energy", {}), potential = column("energy", {});
   std::vector<std::array<double, 5>> statistics;
   size_t done = 0;
@@ -213,6 +242,7 @@ nb::dict PySimulation::advance(nb::handle times_in, const nb::object& quantities
       s.acceleration = row(acceleration, nv);
       s.joint_load = row(load, 6 * nj);
       s.drive_torque = row(torque, nv);
+      s.external = row(external, 6 * nj);
       s.kinetic_energy = row(kinetic, 1);
       s.potential_energy = row(potential, 1);
       if (!simulation.advance(times.data()[done], s)) break;
@@ -233,6 +263,7 @@ nb::dict PySimulation::advance(nb::handle times_in, const nb::object& quantities
   put("acceleration", acceleration);
   put("joint_load", load);
   put("drive_torque", torque);
+  put("external_wrench", external);
   put("kinetic_energy", kinetic);
   put("potential_energy", potential);
   const char* names[5] = {"steps", "evaluations", "iterations", "step_size", "order"};
@@ -321,6 +352,9 @@ void bind_simulation(nb::module_& m) {
       .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a,
            "interpolation"_a = "linear")
       .def("drive_torque_callable", &PySimulation::torque_callable, "joint"_a, "fn"_a)
+      .def("drive_motion_table", &PySimulation::motion_table, "joint"_a, "times"_a, "values"_a,
+           "interpolation"_a = "cubic")
+      .def("drive_motion_callable", &PySimulation::motion_callable, "joint"_a, "fn"_a)
       .def("drive_pd", &PySimulation::pd, "joint"_a, "kp"_a, "kd"_a, "target"_a)
       .def("drive_pd_table", &PySimulation::pd_table, "joint"_a, "kp"_a, "kd"_a, "times"_a,
            "values"_a, "interpolation"_a = "linear")

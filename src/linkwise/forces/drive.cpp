@@ -1,5 +1,7 @@
 #include "linkwise/forces/drive.hpp"
 
+#include <cmath>
+
 #include "linkwise/forces/coordinate_forces.hpp"
 
 namespace linkwise {
@@ -8,7 +10,7 @@ void add_drive_torques(const Model& model, const std::vector<Drive>& drives, dou
                        const double* q, const double* v, double* tau) {
   for (size_t j = 0; j < drives.size(); ++j) {
     const Drive& drive = drives[j];
-    if (drive.kind == DriveKind::free || drive.kind == DriveKind::locked) continue;
+    if (drive.kind == DriveKind::free || is_prescribed(drive.kind)) continue;
     const JointInfo& joint = model.joints[j];
     double values[6], target_rates[6] = {};
     if (drive.table) {
@@ -34,6 +36,28 @@ void add_drive_torques(const Model& model, const std::vector<Drive>& drives, dou
       add_coordinate_forces(e, q, force, tau);
     }
   }
+}
+
+void evaluate_motion(const JointInfo& joint, const Drive& drive, double t, double* q, double* v,
+                     double* a) {
+  if (drive.motion) {
+    drive.motion(t, q, v, a);
+  } else {
+    // An integrator may look a little past the last sample: a table that stopped there would make
+    // it see a jump.
+    drive.table->evaluate(t, q, 0, true);
+    drive.table->evaluate(t, v, 1, true);
+    drive.table->evaluate(t, a, 2, true);
+  }
+  if (joint.type != JointType::planar) return;
+  // v = R^T dq/dt and its derivative, R turning by the third coordinate.
+  const double c = std::cos(q[2]), s = std::sin(q[2]);
+  const double vx = c * v[0] + s * v[1], vy = c * v[1] - s * v[0];
+  const double ax = c * a[0] + s * a[1], ay = c * a[1] - s * a[0];
+  v[0] = vx;
+  v[1] = vy;
+  a[0] = ax + v[2] * vy;
+  a[1] = ay - v[2] * vx;
 }
 
 void add_wrenches(const Model&, const std::vector<Wrench>& wrenches, double t, const double* poses,

@@ -9,7 +9,12 @@
 
 namespace linkwise {
 
-enum class DriveKind { free, torque, torque_table, torque_callable, pd, locked };
+enum class DriveKind { free, torque, torque_table, torque_callable, pd, locked, motion };
+
+/// Whether the joint's motion is given, so that its drive torque is an unknown.
+inline bool is_prescribed(DriveKind kind) {
+  return kind == DriveKind::locked || kind == DriveKind::motion;
+}
 
 struct Drive {
   DriveKind kind = DriveKind::free;
@@ -17,6 +22,8 @@ struct Drive {
   std::optional<Table> table;
   /// (t, q of the joint, v of the joint, out): torque of the joint.
   std::function<void(double, const double*, const double*, double*)> callable;
+  /// (t, then out: coordinates of the joint and their two derivatives): a motion without a table.
+  std::function<void(double, double*, double*, double*)> motion;
   double kp = 0, kd = 0;  ///< N m/rad and N m s/rad, or N/m and N s/m
 };
 
@@ -28,11 +35,17 @@ struct Wrench {
   std::function<void(double, double*)> callable;
 };
 
-/// One drive a joint; adds their torques to tau [nv]. A locked joint gets none: its motion is
-/// given. pd: kp (target - q) + kd (dtarget/dt - dq/dt) along the coordinates, for joints whose
+/// One drive a joint; adds their torques to tau [nv]. A joint whose motion is given gets none.
+/// pd: kp (target - q) + kd (dtarget/dt - dq/dt) along the coordinates, for joints whose
 /// coordinates are angles and distances.
 void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t,
                        const double* q, const double* v, double* tau);
+
+/// Coordinates, rates and accelerations of the joint, [its nv] each, that its motion drive gives at
+/// time t. The drive states coordinates and their derivatives; a planar joint's rates are those of
+/// the child's frame.
+void evaluate_motion(const JointInfo& joint, const Drive& drive, double t, double* q, double* v,
+                     double* a);
 
 /// Adds the wrenches to external [n_joints][6], in the joints' outboard frames.
 void add_wrenches(const Model& model, const std::vector<Wrench>& wrenches, double t,

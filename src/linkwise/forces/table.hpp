@@ -5,20 +5,21 @@
 
 namespace linkwise {
 
-/// On [breaks[i], breaks[i+1]): sum_k c[i][k] (t - breaks[i])^(degree - k), per column; constant
-/// beyond the first and the last break. Coefficients are computed by the caller (a spline library).
+/// On [breaks[i], breaks[i+1]): sum_k c[i][k] (t - breaks[i])^(degree - k), per column; beyond the
+/// first and the last break constant, or (extended) the polynomials there go on. Coefficients are
+/// computed by the caller (a spline library).
 struct Table {
   std::vector<double> breaks;
   int degree = 1, columns = 1;
   std::vector<double> coefficients;  ///< [interval][degree + 1][columns], highest power first
 
-  /// out[columns]; derivative of order 0, 1 or 2, zero beyond the ends.
-  void evaluate(double t, double* out, int derivative = 0) const {
+  /// out[columns]; derivative of order 0, 1 or 2, zero beyond the ends unless extended.
+  void evaluate(double t, double* out, int derivative = 0, bool extended = false) const {
     const double first = breaks.front(), last = breaks.back();
-    const bool outside = t < first || t > last;
+    const bool outside = !extended && (t < first || t > last);
     for (int c = 0; c < columns; ++c) out[c] = 0;
     if (outside && derivative > 0) return;
-    t = std::clamp(t, first, last);
+    if (!extended) t = std::clamp(t, first, last);
     const size_t n = breaks.size() - 1;
     size_t i = std::upper_bound(breaks.begin(), breaks.end(), t) - breaks.begin();
     i = i == 0 ? 0 : std::min(i - 1, n - 1);

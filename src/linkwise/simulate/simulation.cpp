@@ -33,10 +33,11 @@ Simulation::Simulation(std::shared_ptr<const Model> model, SimulationOptions opt
 
 void Simulation::set_drive(int joint, Drive drive) {
   const JointInfo& info = model_->joints[joint];
-  if (drive.kind == DriveKind::pd && info.nq != info.nv)
-    throw InputError(
-        "joint '" + info.name + "'" + model_->where() +
-        ": a pd drive needs angles or distances, not a quaternion; drive it by torque");
+  const bool is_motion = drive.kind == DriveKind::motion;
+  if ((drive.kind == DriveKind::pd || is_motion) && info.nq != info.nv)
+    throw InputError("joint '" + info.name + "'" + model_->where() + ": a " +
+                     (is_motion ? "motion" : "pd") +
+                     " drive needs angles or distances, not a quaternion; drive it by torque");
   drives_[joint] = std::move(drive);
 }
 
@@ -52,27 +53,34 @@ void Simulation::add_wrench(Wrench wrench) {
 void Simulation::start(double t0, const double* q0, const double* v0) {
   const Model& m = *model_;
   ModelSpec spec;
+  any_prescribed_ = any_motion_ = false;
   for (int j = 0; j < m.n_joints(); ++j) {
-    if (drives_[j].kind != DriveKind::locked) continue;
+    if (!is_prescribed(drives_[j].kind)) continue;
     const JointInfo& info = m.joints[j];
+    any_motion_ |= drives_[j].kind == DriveKind::motion;
     for (int i = 0; i < info.nv; ++i)
-      if (v0[info.v + i] != 0)
+      if (drives_[j].kind == DriveKind::locked && v0[info.v + i] != 0)
         throw InputError("joint '" + info.name + "'" + m.where() +
                          " is locked but starts with a rate; start it at rest");
-    if (spec.prescribed.empty()) spec = m.spec();
+    if (!any_prescribed_) spec = m.spec();
+    any_prescribed_ = true;
     spec.prescribed.push_back(info.name);
   }
-  any_locked_ = !spec.prescribed.empty();
-  driven_ = any_locked_ ? std::make_unique<const Model>(std::move(spec)) : nullptr;
+  if (any_motion_ && options_.state == StateChoice::body_velocities)
+    throw InputError(
+        "state body_velocities takes no motion drives; use the state joint_rates for them");
+  driven_ = any_prescribed_ ? std::make_unique<const Model>(std::move(spec)) : nullptr;
   const Model& driven = driven_ ? *driven_ : m;
   method_ = make_dynamics(driven, options_.dynamics);
   output_method_ = make_dynamics(driven, options_.dynamics);
-  inverse_ = any_locked_ ? std::make_unique<InverseDynamics<double>>(m) : nullptr;
+  inverse_ = any_prescribed_ ? std::make_unique<InverseDynamics<double>>(m) : nullptr;
   world_wrenches_ = false;
   for (const Wrench& w : wrenches_) world_wrenches_ |= w.world;
   tau_.resize(m.nv());
   du_.resize(m.nv());
   holding_.resize(m.nv());
+  prescribed_.assign(m.nv(), 0.0);
+  imposed_.resize(any_motion_ ? size() : 0);
   external_.resize(wrenches_.empty() ? 0 : 6 * m.n_joints());
   poses_.resize(world_wrenches_ ? 16 * m.n_joints() : 0);
   y_.assign(q0, q0 + m.nq());
@@ -86,6 +94,7 @@ void Simulation::start(double t0, const double* q0, const double* v0) {
   } else {
     y_.insert(y_.end(), v0, v0 + m.nv());
   }
+  impose_motion(t0, y_.data());
   for (const Element& e : m.elements) {
     if (e.kind != ElementKind::spherical && e.kind != ElementKind::floating) continue;
     const double* p = &y_[e.q + e.nq - 4];
@@ -110,6 +119,7 @@ SweepInput<double> Simulation::applied_forces(double t, const double* q, const d
   in.q = q;
   in.v = v;
   in.tau = tau_.data();
+  in.prescribed = prescribed_.data();
   if (!wrenches_.empty()) {
     if (world_wrenches_) body_poses(m, q, poses_.data());
     std::fill(external_.begin(), external_.end(), 0.0);
@@ -173,14 +183,43 @@ void Simulation::record_failure(double t, const DynamicsReport& report, const do
 }
 
 bool Simulation::evaluate(double t, const double* y, double* ydot) {
-  const double *q = y, *v = y + model_->nq();
+  const Model& m = *model_;
+  if (any_motion_) return evaluate_imposed(t, y, ydot);
+  const double *q = y, *v = y + m.nq();
   position_rates(q, v, ydot);
-  double* dv = ydot + model_->nq();
+  double* dv = ydot + m.nq();
   if (!body_velocities_) return accelerations(*method_, t, q, v, dv, nullptr);
   const SweepInput<double> in = applied_forces(t, q, rates_.data());
   const auto evaluation = [&] { return body_velocities_->evaluate(t, in, v, dv); };
   const DynamicsReport report = keeps_trace_ ? traced(t, evaluation) : evaluation();
   return accepts(t, report, dv, body_velocities_->size());
+}
+
+bool Simulation::evaluate_imposed(double t, const double* y, double* ydot) {
+  const Model& m = *model_;
+  std::copy(y, y + size(), imposed_.begin());
+  impose_motion(t, imposed_.data());
+  const double *q = imposed_.data(), *v = q + m.nq();
+  position_rates(q, v, ydot);
+  const bool ok = accelerations(*method_, t, q, v, ydot + m.nq(), nullptr);
+  // Given motions are not integrated: their entries of the state rest where they started.
+  for (int j = 0; j < m.n_joints(); ++j) {
+    if (drives_[j].kind != DriveKind::motion) continue;
+    const JointInfo& info = m.joints[j];
+    std::fill_n(ydot + info.q, info.nq, 0.0);
+    std::fill_n(ydot + m.nq() + info.v, info.nv, 0.0);
+  }
+  return ok;
+}
+
+void Simulation::impose_motion(double t, double* y) {
+  if (!any_motion_) return;
+  const Model& m = *model_;
+  for (int j = 0; j < m.n_joints(); ++j) {
+    if (drives_[j].kind != DriveKind::motion) continue;
+    const JointInfo& info = m.joints[j];
+    evaluate_motion(info, drives_[j], t, y + info.q, y + m.nq() + info.v, &prescribed_[info.v]);
+  }
 }
 
 void Simulation::position_rates(const double* q, const double* v, double* qdot) {
@@ -228,6 +267,7 @@ bool Simulation::advance(double t, const Sample& sample) {
     return false;
   }
   integrator_->interpolate(t, y_);
+  impose_motion(t, y_.data());
   return write_sample(t, sample);
 }
 
@@ -241,7 +281,7 @@ bool Simulation::write_sample(double t, const Sample& s) {
   }
   if (s.position) std::copy(q, q + m.nq(), s.position);
   if (s.velocity) std::copy(v, v + m.nv(), s.velocity);
-  if (s.acceleration || s.joint_load || s.drive_torque) {
+  if (s.acceleration || s.joint_load || s.drive_torque || s.external) {
     const long iterations = iterations_;
     const bool ok = accelerations(*output_method_, t, q, v, du_.data(), s.joint_load);
     iterations_ = iterations;  // those of the record are not the integration's
@@ -251,28 +291,39 @@ bool Simulation::write_sample(double t, const Sample& s) {
     }
     output_method_->accepted(t);
     if (s.acceleration) std::copy(du_.begin(), du_.end(), s.acceleration);
+    if (s.external) {
+      if (external_.empty())
+        std::fill_n(s.external, 6 * m.n_joints(), 0.0);
+      else
+        std::copy(external_.begin(), external_.end(), s.external);
+    }
     if (s.drive_torque) {
       std::copy(holding_.begin(), holding_.end(), s.drive_torque);
-      if (any_locked_) {
-        // What holds a locked joint: the torque of the motion less what the joint does by itself.
-        SweepInput<double> in;
-        in.q = q;
-        in.v = v;
-        in.external = wrenches_.empty() ? nullptr : external_.data();
-        std::vector<double> total(m.nv());
-        inverse_->evaluate(in, du_.data(), total.data(), nullptr);
-        for (int j = 0; j < m.n_joints(); ++j) {
-          if (drives_[j].kind != DriveKind::locked) continue;
-          const JointInfo& info = m.joints[j];
-          for (int i = info.v; i < info.v + info.nv; ++i)
-            s.drive_torque[i] = total[i] - (tau_[i] - holding_[i]);
-        }
-      }
+      write_holding_torques(q, v, s.drive_torque);
     }
   }
   if (s.kinetic_energy) *s.kinetic_energy = kinetic_energy(m, q, v);
   if (s.potential_energy) *s.potential_energy = potential_energy(m, q);
   return true;
+}
+
+/// What moves or holds a joint of given motion: the torque of the motion less what the joint does
+/// by itself.
+void Simulation::write_holding_torques(const double* q, const double* v, double* drive_torque) {
+  if (!any_prescribed_) return;
+  const Model& m = *model_;
+  SweepInput<double> in;
+  in.q = q;
+  in.v = v;
+  in.external = wrenches_.empty() ? nullptr : external_.data();
+  std::vector<double> total(m.nv());
+  inverse_->evaluate(in, du_.data(), total.data(), nullptr);
+  for (int j = 0; j < m.n_joints(); ++j) {
+    if (!is_prescribed(drives_[j].kind)) continue;
+    const JointInfo& info = m.joints[j];
+    for (int i = info.v; i < info.v + info.nv; ++i)
+      drive_torque[i] = total[i] - (tau_[i] - holding_[i]);
+  }
 }
 
 SimulationStatistics Simulation::statistics() const {

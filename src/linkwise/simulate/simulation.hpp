@@ -32,6 +32,7 @@ struct SimulationOptions {
 struct Sample {
   double *position = nullptr, *velocity = nullptr, *acceleration = nullptr, *joint_load = nullptr,
          *drive_torque = nullptr;
+  double* external = nullptr;  ///< wrenches on the bodies, [n_joints][6], in their own frames
   double *kinetic_energy = nullptr, *potential_energy = nullptr;
 };
 
@@ -64,7 +65,8 @@ class Simulation : private OdeSystem {
   void set_drive(int joint, Drive drive);
   void add_wrench(Wrench wrench);
 
-  /// Fixes the drives and starts at t0. Rates of locked joints must be zero.
+  /// Fixes the drives and starts at t0. Rates of locked joints must be zero; the state of joints
+  /// with a motion drive is that of the motion, whatever q0 and v0 say.
   void start(double t0, const double* q0, const double* v0);
 
   /// Steps until t is covered, then writes the sample there. False when the run stopped: see
@@ -100,19 +102,22 @@ class Simulation : private OdeSystem {
   bool accepts(double t, const DynamicsReport& report, const double* du, int n);
   void record_failure(double t, const DynamicsReport& report, const double* du);
   bool write_sample(double t, const Sample& sample);
+  void impose_motion(double t, double* y);
+  bool evaluate_imposed(double t, const double* y, double* ydot);
+  void write_holding_torques(const double* q, const double* v, double* drive_torque);
 
   std::shared_ptr<const Model> model_;   ///< as the user sees it
-  std::unique_ptr<const Model> driven_;  ///< the same with locked joints prescribed, or null
+  std::unique_ptr<const Model> driven_;  ///< the same with given motions prescribed, or null
   SimulationOptions options_;
   Choice choice_;
   std::vector<Drive> drives_;
   std::vector<Wrench> wrenches_;
-  bool world_wrenches_ = false, any_locked_ = false;
+  bool world_wrenches_ = false, any_prescribed_ = false, any_motion_ = false;
   std::unique_ptr<DynamicsMethod> method_, output_method_;
   std::unique_ptr<InverseDynamics<double>> inverse_;
   std::unique_ptr<Integrator> integrator_;
   std::unique_ptr<BodyVelocities> body_velocities_;
-  std::vector<double> tau_, external_, poses_, y_, du_, holding_, rates_;
+  std::vector<double> tau_, external_, poses_, y_, du_, holding_, rates_, imposed_, prescribed_;
   double drift_ = 0;
   long iterations_ = 0;
   bool keeps_trace_ = false;
