@@ -213,7 +213,8 @@ class Scene:
                 "/bodies/lines",
                 points=np.zeros((outboard.size, 2, 3)),
                 colors=_ROD_TONE,
-                line_width=2.5,
+                thickness=2.5,
+                thickness_units="screen",
             )
             self._layers["Bodies"].append(Layer(lines, _lines(inboard[outboard], outboard)))
         self.joint_marks = self._add(

@@ -15,8 +15,8 @@ imageio = pytest.importorskip("imageio.v3")
 
 pytestmark = pytest.mark.browser
 PATIENCE = 90  # seconds; without a GPU a frame can take one
-WINDOW = {"width": 1000, "height": 640}
-SCENE = {"x": 0, "y": 190, "width": 610, "height": 380}  # beside the panel, below messages
+WINDOW = {"width": 900, "height": 560}
+SCENE = {"x": 0, "y": 190, "width": 510, "height": 300}  # beside the panel, below messages
 MACHINE_TONE = 0.80  # of white: the grid is lighter, what belongs to the machine darker
 
 
@@ -86,7 +86,7 @@ def wait_for_time(page, holds):
 
 
 def toggle(page, name):
-    page.get_by_label(name, exact=True).click()
+    page.get_by_role("checkbox", name=name, exact=True).click()
 
 
 def test_run_plays_scrubs_and_toggles(serve, run_path, page):
@@ -99,15 +99,14 @@ def test_run_plays_scrubs_and_toggles(serve, run_path, page):
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Play").wait_for()
     stopped = readout(page)
-    moved = still(page)
-    assert (np.abs(moved - start) > 0.1).sum() > 200
+    wait_for(page, lambda image: (np.abs(image - start) > 0.1).sum() > 200, "moved")
     assert readout(page) == stopped  # paused
 
     page.get_by_role("slider").first.press("End")
     wait_for_time(page, lambda now: now == 2)
     page.get_by_role("slider").first.press("Home")
     wait_for_time(page, lambda now: now == 0)
-    assert (np.abs(still(page) - start) > 0.1).sum() < 50
+    wait_for(page, lambda image: (np.abs(image - start) > 0.1).sum() < 50, "back at the start")
 
     page.get_by_role("slider").first.press("End")
     wait_for_time(page, lambda now: now == 2)
@@ -131,7 +130,7 @@ def test_load_of_the_chosen_joint_is_plotted(serve, run_path, page):
     wait_for_time(page, lambda now: now == 2)
     loads = lw.open_run(run_path).joint_load.isel(time=-1)
     for joint in ("wrist_roll", "elbow_pitch"):
-        page.get_by_role("textbox", name="Joint").click()
+        page.get_by_role("combobox", name="Joint").click()
         page.get_by_role("option", name=joint).click()
         force = np.linalg.norm(loads.sel(joint=joint).values[:3])
         page.get_by_text(f"{force:.4g} N,").wait_for()
