@@ -332,6 +332,7 @@ nb::list method_list() {
     d["description"] = std::string(e.description);
     d["reference"] = std::string(e.reference);
     d["uses_solver"] = e.uses_solver;
+    d["chains_only"] = e.chains_only;
     out.append(d);
   }
   return out;

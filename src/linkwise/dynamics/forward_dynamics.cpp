@@ -45,16 +45,16 @@ std::unique_ptr<DynamicsMethod> make_piecewise(const Model& model, const Dynamic
 
 constexpr DynamicsEntry table[] = {
     {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false,
-     make_recursion<ArticulatedBody<double>>},
+     false, make_recursion<ArticulatedBody<double>>},
     {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993",
-     true, make_constraint_force},
+     true, false, make_constraint_force},
     {"piecewise",
      "one long revolute chain in pieces: recursion inside, constraint forces between, on lanes and "
      "threads",
-     "anderson2000", true, make_piecewise},
+     "anderson2000", true, true, make_piecewise},
     {"composite_rigid_body",
      "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)", "walker1982", false,
-     make_recursion<CompositeRigidBody>},
+     false, make_recursion<CompositeRigidBody>},
 };
 
 }  // namespace

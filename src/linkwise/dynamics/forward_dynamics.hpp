@@ -44,6 +44,7 @@ struct DynamicsEntry {
   std::string_view description;
   std::string_view reference;  ///< key in references.bib
   bool uses_solver;
+  bool chains_only;  ///< takes one kind of machine only; the others take every tree
   std::unique_ptr<DynamicsMethod> (*make)(const Model&, const DynamicsOptions&);
 };
 
