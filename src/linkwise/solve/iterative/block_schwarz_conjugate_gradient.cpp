@@ -8,17 +8,16 @@
 #include <algorithm>
 
 #include "linkwise/solve/direct/tree_factor.hpp"
-#include "linkwise/solve/iterative/iterative_solver.hpp"
-#include "linkwise/solve/iterative/krylov.hpp"
 #include "linkwise/solve/iterative/pieces.hpp"
+#include "linkwise/solve/iterative/preconditioned.hpp"
 
 namespace linkwise {
 namespace {
 
-class BlockSchwarzConjugateGradient final : public IterativeSolver {
+class BlockSchwarzConjugateGradient final : public PreconditionedConjugateGradient {
  public:
   explicit BlockSchwarzConjugateGradient(const SolverOptions& options)
-      : IterativeSolver(options, Coordinates::original) {}
+      : PreconditionedConjugateGradient(options, Coordinates::original) {}
 
  private:
   static constexpr int default_block_size = 8;
@@ -26,33 +25,18 @@ class BlockSchwarzConjugateGradient final : public IterativeSolver {
   Outcome prepare(const BlockTree& A) override {
     if (!pieces_.fits(A))
       cut_into_pieces(A, options_.block_size > 0 ? options_.block_size : default_block_size, cut_);
-    preconditioned_.resize(A.size());
     const Outcome outcome = pieces_.factor(A, cut_);
     set_failed_node(pieces_.failed_node());
     return outcome;
   }
 
-  std::span<const double> precondition(std::span<const double> r, std::span<double> z) {
+  void precondition(std::span<const double> r, std::span<double> z) override {
     std::copy(r.begin(), r.end(), z.begin());
     pieces_.solve_in_place(z);
-    return z;
-  }
-
-  double preconditioned_square(std::span<const double> residual) override {
-    return dot(residual, precondition(residual, preconditioned_));
-  }
-
-  void iterate(std::span<const double> b, std::span<double> x, StopTest& stop) override {
-    conjugate_gradients(
-        b, x, stop, work_,
-        [this](std::span<const double> v, std::span<double> w) { multiply(v, w); },
-        [this](std::span<const double> r, std::span<double> z) { return precondition(r, z); });
   }
 
   TreeFactor pieces_;
   std::vector<char> cut_;
-  KrylovVectors work_;
-  std::vector<double> preconditioned_;
 };
 
 }  // namespace

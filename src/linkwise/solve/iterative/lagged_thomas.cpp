@@ -9,41 +9,27 @@
 #include <algorithm>
 
 #include "linkwise/solve/direct/tree_factor.hpp"
-#include "linkwise/solve/iterative/iterative_solver.hpp"
-#include "linkwise/solve/iterative/krylov.hpp"
+#include "linkwise/solve/iterative/preconditioned.hpp"
 
 namespace linkwise {
 namespace {
 
-class LaggedThomas final : public IterativeSolver {
+class LaggedThomas final : public PreconditionedConjugateGradient {
  public:
   explicit LaggedThomas(const SolverOptions& options)
-      : IterativeSolver(options, Coordinates::original) {}
+      : PreconditionedConjugateGradient(options, Coordinates::original) {}
 
  private:
   Outcome prepare(const BlockTree& A) override {
-    preconditioned_.resize(A.size());
     if (factor_.fits(A)) return Outcome::converged;
     const Outcome outcome = factor_.factor(A);
     set_failed_node(factor_.failed_node());
     return outcome;
   }
 
-  std::span<const double> precondition(std::span<const double> r, std::span<double> z) {
+  void precondition(std::span<const double> r, std::span<double> z) override {
     std::copy(r.begin(), r.end(), z.begin());
     factor_.solve_in_place(z);
-    return z;
-  }
-
-  double preconditioned_square(std::span<const double> residual) override {
-    return dot(residual, precondition(residual, preconditioned_));
-  }
-
-  void iterate(std::span<const double> b, std::span<double> x, StopTest& stop) override {
-    conjugate_gradients(
-        b, x, stop, work_,
-        [this](std::span<const double> v, std::span<double> w) { multiply(v, w); },
-        [this](std::span<const double> r, std::span<double> z) { return precondition(r, z); });
   }
 
   void finished(const Report& report) override {
@@ -51,8 +37,6 @@ class LaggedThomas final : public IterativeSolver {
   }
 
   TreeFactor factor_;
-  KrylovVectors work_;
-  std::vector<double> preconditioned_;
 };
 
 }  // namespace

@@ -11,9 +11,8 @@ namespace linkwise {
 /// joints of a hub stay together with its inboard joint, so that pieces around hubs grow larger and
 /// a tree that branches everywhere stays whole.
 inline void cut_into_pieces(const BlockTree& A, int joints, std::vector<char>& cut) {
-  static thread_local std::vector<int> depth;
+  std::vector<int> depth(A.n(), 1);
   cut.assign(A.n(), 0);
-  depth.assign(A.n(), 1);
   for (int i = 0; i < A.n(); ++i) {
     const int p = A.parent[i];
     if (p < 0) continue;

@@ -9,43 +9,27 @@
 
 #include "linkwise/solve/iterative/symmetric_stair_conjugate_gradient.hpp"
 
-#include "linkwise/solve/iterative/iterative_solver.hpp"
-#include "linkwise/solve/iterative/krylov.hpp"
+#include "linkwise/solve/iterative/preconditioned.hpp"
 
 namespace linkwise {
 namespace {
 
-class SymmetricStairConjugateGradient final : public IterativeSolver {
+class SymmetricStairConjugateGradient final : public PreconditionedConjugateGradient {
  public:
   explicit SymmetricStairConjugateGradient(const SolverOptions& options)
-      : IterativeSolver(options, Coordinates::block_scaled) {}
+      : PreconditionedConjugateGradient(options, Coordinates::block_scaled) {}
 
  private:
   Outcome prepare(const BlockTree&) override {
     shift_ = scaled().joints_on_a_body();
-    preconditioned_.resize(scaled().size());
     return Outcome::converged;
   }
 
-  std::span<const double> precondition(std::span<const double> r, std::span<double> z) const {
+  void precondition(std::span<const double> r, std::span<double> z) override {
     multiply(r, z);
     for (std::size_t i = 0; i < z.size(); ++i) z[i] = shift_ * r[i] - z[i];
-    return z;
   }
 
-  double preconditioned_square(std::span<const double> residual) override {
-    return dot(residual, precondition(residual, preconditioned_));
-  }
-
-  void iterate(std::span<const double> b, std::span<double> x, StopTest& stop) override {
-    conjugate_gradients(
-        b, x, stop, work_,
-        [this](std::span<const double> v, std::span<double> w) { multiply(v, w); },
-        [this](std::span<const double> r, std::span<double> z) { return precondition(r, z); });
-  }
-
-  KrylovVectors work_;
-  std::vector<double> preconditioned_;
   double shift_ = 2.0;
 };
 

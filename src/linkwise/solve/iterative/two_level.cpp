@@ -15,17 +15,16 @@
 #include "linkwise/linear/vector.hpp"
 #include "linkwise/solve/direct/tree_factor.hpp"
 #include "linkwise/solve/iterative/coarse_space.hpp"
-#include "linkwise/solve/iterative/iterative_solver.hpp"
-#include "linkwise/solve/iterative/krylov.hpp"
 #include "linkwise/solve/iterative/pieces.hpp"
+#include "linkwise/solve/iterative/preconditioned.hpp"
 
 namespace linkwise {
 namespace {
 
-class TwoLevel final : public IterativeSolver {
+class TwoLevel final : public PreconditionedConjugateGradient {
  public:
   explicit TwoLevel(const SolverOptions& options)
-      : IterativeSolver(options, Coordinates::original) {}
+      : PreconditionedConjugateGradient(options, Coordinates::original) {}
 
  private:
   static constexpr int default_block_size = 32;
@@ -45,13 +44,12 @@ class TwoLevel final : public IterativeSolver {
     return outcome;
   }
 
-  std::span<const double> precondition(std::span<const double> r, std::span<double> z) {
+  void precondition(std::span<const double> r, std::span<double> z) override {
     std::copy(r.begin(), r.end(), z.begin());
     pieces_.solve_in_place(z);
     coarse_.restrict_cuts(system(), z);
     coarse_.solve();
     coarse_.prolong_add(z);
-    return z;
   }
 
   // r = A Q r + (the rest): the coarse part's energy is exact, the pieces' that of the rest.
@@ -69,11 +67,7 @@ class TwoLevel final : public IterativeSolver {
 
   void iterate(std::span<const double> b, std::span<double> x, StopTest& stop) override {
     project_start(b, x);
-    conjugate_gradients(
-        b, x, stop, work_,
-        [this](std::span<const double> v, std::span<double> w) { multiply(v, w); },
-        [this](std::span<const double> r, std::span<double> z) { return precondition(r, z); }, 0.0,
-        true);
+    run_conjugate_gradients(b, x, stop, true);
   }
 
   // x += Q (b - A x). The slowest modes live here; where they are so slow that one correction in
@@ -90,7 +84,8 @@ class TwoLevel final : public IterativeSolver {
       coarse_.restrict_all(work_.r);
       const double energy = coarse_.solve();
       if (pass == 0) first = energy;
-      if (pass > 0 && energy <= 1e-3 * options_.tolerance * options_.tolerance * first) return;
+      const double scale = std::max(first, dot(x, b));
+      if (pass > 0 && energy <= 1e-3 * options_.tolerance * options_.tolerance * scale) return;
       coarse_.prolong_add(x);
     }
     accurate_residual(system(), b, x, work_.r);
@@ -99,7 +94,6 @@ class TwoLevel final : public IterativeSolver {
   TreeFactor pieces_;
   CoarseSpace coarse_;
   std::vector<char> cut_;
-  KrylovVectors work_;
   std::vector<double> scratch_, correction_;
 };
 
