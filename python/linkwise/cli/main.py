@@ -8,9 +8,11 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from linkwise.cli.compare import compare
 from linkwise.cli.demo import demo
 from linkwise.cli.inspect import inspect
 from linkwise.cli.output import DONE, FAILED, WRONG_INPUT, print_json, say
+from linkwise.cli.paper import paper
 from linkwise.cli.run import run
 from linkwise.cli.view import view
 
@@ -23,8 +25,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.command()(compare)
 app.command()(demo)
 app.command()(inspect)
+app.command()(paper)
 app.command()(run)
 app.command()(view)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from linkwise.cli.output import console
 
@@ -44,5 +44,36 @@ def live_progress(quiet: bool) -> Iterator[Callable[[Progress], None] | None]:
         def show(progress: Progress) -> None:
             fraction = progress.time / progress.duration if progress.duration else 1.0
             bar.update(task, completed=fraction, description=describe(progress))
+
+        yield show
+
+
+class Step(Protocol):
+    """What is about to be computed, and how many of how many steps are done."""
+
+    @property
+    def what(self) -> str: ...
+    @property
+    def done(self) -> int: ...
+    @property
+    def total(self) -> int: ...
+
+
+@contextmanager
+def live_steps(quiet: bool) -> Iterator[Callable[[Step], None] | None]:
+    """A callback for work of many steps, or None when there is nobody to watch."""
+    screen = console(stderr=True)
+    if quiet or not screen.is_terminal:
+        yield None
+        return
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    columns = (BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    with Bar(*columns, console=screen, transient=True) as bar:
+        task = bar.add_task("starting", total=None)
+
+        def show(step: Step) -> None:
+            bar.update(task, completed=step.done, total=step.total, description=step.what)
 
         yield show

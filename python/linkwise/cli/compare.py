@@ -1,0 +1,136 @@
+"""`linkwise compare`: every method, solver and guess on the user's own model and machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from linkwise.cli.output import JsonOption, console, number, print_json, table, text
+from linkwise.cli.progress import live_steps
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
+    from linkwise.compare import Motion
+
+
+def compare(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL|SCENARIO", help="Model file (URDF, MJCF) or scenario.")
+    ],
+    states: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Successive states to evaluate at.")
+    ] = 32,
+    tolerance: Annotated[
+        float, typer.Option(help="Relative tolerance of iterative solvers.")
+    ] = 1e-7,
+    stop: Annotated[
+        str, typer.Option(help="Stop rule: energy_norm, residual or paper.")
+    ] = "energy_norm",
+    limit: Annotated[
+        float, typer.Option(min=0.01, help="Seconds that a solver may take over all states.")
+    ] = 2.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random pose of a model.")] = 0,
+    plot: Annotated[
+        Path | None,
+        typer.Option("--plot", help="Write a chart (SVG) to this file.", show_default=False),
+    ] = None,
+    floating_base: Annotated[
+        bool, typer.Option("--floating-base", help="Let the root link of a model file float.")
+    ] = False,
+    package_dir: Annotated[
+        list[Path] | None,
+        typer.Option("--package-dir", help="Where packages of package:// paths are; repeatable."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run every method, solver and initial guess on MODEL or SCENARIO and compare them.
+
+    A model is let go at rest in a random pose; a scenario is followed to its middle. Iterative
+    solvers start from the solutions of the steps before.
+    """
+    from linkwise.compare import compare as run_comparison
+    from linkwise.compare import plot as draw
+
+    if plot is not None and plot.suffix.lower() != ".svg":
+        raise typer.BadParameter(f"{plot}: charts are written as SVG; name a file in .svg")
+    loaded, motion = _motion(model, states, seed, floating_base, package_dir or [])
+    with live_steps(quiet=as_json) as progress:
+        found = run_comparison(
+            loaded, motion, tolerance=tolerance, stop=stop, time_limit=limit, progress=progress
+        )
+    if plot is not None:
+        plot.write_text(draw(found) + "\n", encoding="utf-8")
+        found["plot"] = str(plot)
+    if as_json:
+        print_json(found)
+    else:
+        _show(found)
+
+
+def _motion(
+    path: Path, states: int, seed: int, floating_base: bool, package_dirs: list[Path]
+) -> tuple[Model, Motion]:
+    from linkwise.compare import driven_motion, free_motion
+    from linkwise.io.load import load
+    from linkwise.scenario import load_scenario
+
+    if path.suffix.lower() != ".toml":
+        model = load(path, floating_base=floating_base, package_dirs=package_dirs)
+        return model, free_motion(model, states, seed)
+    if floating_base or package_dirs:
+        raise typer.BadParameter("a scenario says itself how its model is loaded; edit it")
+    scenario = load_scenario(path)
+    model = scenario.load_model()
+    return model, driven_motion(model, scenario.simulate_arguments(model), states)
+
+
+def _show(found: dict[str, Any]) -> None:
+    screen = console()
+    unknowns = found["unknowns"]
+    system = (
+        f"A f = b has {unknowns} unknowns, condition {number(found['condition_estimate'], 3)}, "
+        f"Jacobi's spectral radius {number(found['spectral_radius'], 6)}."
+        if unknowns is not None
+        else f"No A f = b: {found['system_message']}."
+    )
+    screen.print(
+        f"{text(found['model'])}, {found['bodies']} bodies, {found['degrees_of_freedom']} degrees "
+        f"of freedom, {found['motion']}: {found['states']} steps of "
+        f"{number(1e3 * found['mean_step'], 3)} ms. {text(system)}",
+    )
+    shown = table(
+        "",
+        [
+            ("method or solver", "left"),
+            ("guess", "left"),
+            ("iterations", "right"),
+            ("most", "right"),
+            ("time a call [us]", "right"),
+            ("error", "right"),
+            ("outcome", "left"),
+        ],
+    )
+    for row in found["rows"]:
+        style = "" if row["outcome"] == "converged" else "yellow"
+        shown.add_row(
+            row["solver"] or row["method"],
+            row["initial_guess"],
+            _cell(row["mean_iterations"], 3),
+            _cell(row["max_iterations"], 6),
+            _cell(row["seconds"], 3, 1e6),
+            _cell(row["error"], 2),
+            row["outcome"],
+            style=style,
+        )
+    screen.print(shown)
+    for row in found["rows"]:
+        if row["message"]:
+            screen.print(f"{row['solver'] or row['method']}: {text(row['message'])}", markup=False)
+    if "plot" in found:
+        screen.print(f"Chart: {found['plot']}", markup=False)
+
+
+def _cell(value: float | None, digits: int, scale: float = 1.0) -> str:
+    return "" if value is None else number(scale * value, digits)

@@ -1,0 +1,332 @@
+"""Every dynamics method, linear solver and initial guess on one model, side by side."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise import _core
+from linkwise._core import InputError
+from linkwise.charts import Dot, DotChart, dots_to_svg
+from linkwise.drives import as_drive, as_wrench
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
+
+Array = npt.NDArray[np.float64]
+
+REFERENCE = "articulated_body"
+#: The first states of a motion fill the guesses' histories and are not counted.
+WARM_UP = 8
+# A run that makes states to compare on is given up after this many seconds of computing.
+_RUN_LIMIT = 30.0
+# A free motion is long enough when it has as many steps as states are wanted, or at this time.
+_FREE_DURATION = 5.0
+_CHUNKS = 200
+# Each contestant repeats its pass over the states for about this long.
+_TIMING_SECONDS = 0.1
+_SPECTRUM_STATES = 3
+
+
+class Motion(NamedTuple):
+    """Successive states of a motion, a step of the integrator apart."""
+
+    times: Array
+    q: Array
+    v: Array
+    tau: Array
+    description: str
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """One way to compute accelerations."""
+
+    method: str
+    solver: str = ""
+    initial_guess: str = ""
+
+
+class Step(NamedTuple):
+    """What is about to be measured, and how many of how many are done."""
+
+    what: str
+    done: int
+    total: int
+
+
+def contestants() -> Iterator[Contestant]:
+    """All of them, from the tables of the core."""
+    guesses = [entry["name"] for entry in _core.initial_guesses()]
+    for method in _core.methods():
+        if method["name"] != "constraint_force":
+            yield Contestant(method["name"])
+            continue
+        for solver in _core.solvers():
+            if solver["kind"] == "direct":
+                yield Contestant(method["name"], solver["name"])
+            else:
+                for guess in guesses:
+                    yield Contestant(method["name"], solver["name"], guess)
+
+
+def free_motion(model: Model, states: int, seed: int) -> Motion:
+    """The model let go at rest in a random pose within its limits (seeded)."""
+    simulation = _core.Simulation(model, method=REFERENCE)
+    q0 = random_pose(model, np.random.default_rng(seed))
+    return _record(
+        simulation, model, q0, np.zeros(model.nv), _FREE_DURATION, states, "let go at rest"
+    )
+
+
+def driven_motion(model: Model, arguments: Mapping[str, Any], states: int) -> Motion:
+    """The motion of a scenario, as `Scenario.simulate_arguments` describes it, to its middle."""
+    simulation = _core.Simulation(
+        model,
+        method=REFERENCE,
+        integrator=arguments.get("integrator", "adams"),
+        tolerance=arguments.get("tolerance", 1e-6),
+        step=arguments.get("step"),
+        max_step=arguments.get("max_step"),
+    )
+    for joint, drive in (arguments.get("drives") or {}).items():
+        as_drive(drive).apply(simulation, joint)
+    for body, wrench in (arguments.get("wrenches") or {}).items():
+        as_wrench(wrench).apply(simulation, body)
+    q0, v0 = arguments.get("q0"), arguments.get("v0")
+    return _record(
+        simulation,
+        model,
+        model.neutral_configuration() if q0 is None else q0,
+        np.zeros(model.nv) if v0 is None else v0,
+        float(arguments["duration"]) / 2,
+        states,
+        "the scenario's motion",
+    )
+
+
+def random_pose(model: Model, rng: np.random.Generator) -> Array:
+    """Coordinates within their limits, up to 1 rad or m about neutral where there are none."""
+    q = np.array(model.neutral_configuration(), dtype=float)
+    for k, joint in enumerate(model.joint_names):
+        if model.joint_nq[k] != model.joint_nv[k]:
+            continue  # quaternions stay neutral
+        places, rates = model.q_slice(joint), model.v_slice(joint)
+        low = np.maximum(model.lower_limit[rates], q[places] - 1.0)
+        high = np.minimum(model.upper_limit[rates], q[places] + 1.0)
+        inside = low < high
+        q[places] = np.where(inside, rng.uniform(np.minimum(low, high), high), q[places])
+    return q
+
+
+def _record(
+    simulation: Any,
+    model: Model,
+    q0: npt.ArrayLike,
+    v0: npt.ArrayLike,
+    duration: float,
+    states: int,
+    description: str,
+) -> Motion:
+    """The last accepted steps of a run, with their torques."""
+    simulation.keep_trace()
+    simulation.start(0.0, q0, v0)
+    wanted = states + WARM_UP
+    started = clock.monotonic()
+    for end in np.linspace(0.0, duration, _CHUNKS + 1)[1:]:
+        reached = simulation.advance([end], ())
+        spent = clock.monotonic() - started
+        if reached["outcome"] != "converged" or spent > _RUN_LIMIT:
+            break
+    trace = simulation.trace()
+    times = np.unique(trace["time"][trace["accepted"]])
+    times = times[(times > 0) & (times <= duration)][-wanted:]
+    if times.size <= WARM_UP:
+        raise InputError(
+            f"compare: the motion of {model.name!r} ended after {times.size} steps "
+            f"({reached['outcome']} {reached['message'] or ''}); give a scenario that runs longer"
+        )
+    simulation.start(0.0, q0, v0)
+    found = simulation.advance(times, ("position", "velocity", "acceleration", "drive_torque"))
+    q, v = found["position"], found["velocity"]
+    return Motion(found["time"], q, v, found["drive_torque"], description)
+
+
+def compare(
+    model: Model,
+    motion: Motion,
+    *,
+    tolerance: float = 1e-7,
+    stop: str = "energy_norm",
+    max_iterations: int = 0,
+    time_limit: float = 2.0,
+    progress: Callable[[Step], object] | None = None,
+) -> dict[str, Any]:
+    """Measure all contestants along `motion`; rows are sorted, the fastest that converge first.
+
+    Errors are those of the accelerations in the kinetic-energy norm against the articulated-body
+    recursion, the largest along the motion relative to the largest acceleration. A contestant that
+    fails, that does not suit the model, or that needs more than `time_limit` seconds stays in the
+    table and says so.
+    """
+    reference = _core.Evaluator(model, method=REFERENCE).follow(
+        motion.times, motion.q, motion.v, motion.tau, passive=True
+    )
+    expected = reference["acceleration"]
+    everyone = list(contestants())
+    rows = []
+    for k, contestant in enumerate(everyone):
+        if progress is not None:
+            name = " ".join(filter(None, (contestant.solver, contestant.initial_guess)))
+            progress(Step(name or contestant.method, k, len(everyone)))
+        rows.append(
+            _measure(
+                model,
+                motion,
+                contestant,
+                expected,
+                time_limit,
+                {"tolerance": tolerance, "stop": stop, "max_iterations": max_iterations},
+            )
+        )
+    return {
+        "model": model.name,
+        "bodies": model.n_bodies,
+        "degrees_of_freedom": model.nv,
+        "motion": motion.description,
+        "states": int(motion.times.size - WARM_UP),
+        "mean_step": float(np.diff(motion.times).mean()),
+        "tolerance": tolerance,
+        "stop": stop,
+        **_system(model, motion),
+        "rows": sorted(rows, key=_rank),
+    }
+
+
+def _rank(row: Mapping[str, Any]) -> tuple[int, float, float]:
+    seconds, error = row["seconds"], row["error"]
+    order = 0 if row["outcome"] == "converged" else 2 if seconds is None else 1
+    return order, math.inf if seconds is None else seconds, math.inf if error is None else error
+
+
+def _measure(
+    model: Model,
+    motion: Motion,
+    contestant: Contestant,
+    expected: Array,
+    time_limit: float,
+    options: Mapping[str, Any],
+) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "method": contestant.method,
+        "solver": contestant.solver,
+        "initial_guess": contestant.initial_guess,
+        "mean_iterations": None,
+        "max_iterations": None,
+        "seconds": None,
+        "error": None,
+        "states": 0,
+        "outcome": "converged",
+        "message": "",
+    }
+    try:
+        evaluator = _core.Evaluator(
+            model,
+            method=contestant.method,
+            solver=contestant.solver or "auto",
+            initial_guess=contestant.initial_guess or "zero",
+            **options,
+        )
+        started = clock.monotonic()
+        found = _pass(evaluator, motion, time_limit)
+    except InputError as error:
+        return {**row, "outcome": "does not apply", "message": str(error)}
+    seconds = found["seconds"]
+    while clock.monotonic() - started < _TIMING_SECONDS:
+        again = _pass(evaluator, motion, time_limit)["seconds"]
+        count = min(seconds.size, again.size)
+        seconds = np.minimum(seconds[:count], again[:count])
+    row["states"] = max(0, seconds.size - WARM_UP)
+    counted = slice(WARM_UP if seconds.size > WARM_UP else 0, None)
+    failed = [outcome for outcome in found["outcome"] if outcome != "converged"]
+    if failed:
+        row["outcome"] = failed[0]
+    elif seconds.size < motion.times.size:
+        row["outcome"] = "too slow"
+        row["message"] = f"stopped after {time_limit:g} s"
+    row["seconds"] = float(seconds[counted].mean())
+    if contestant.initial_guess:
+        row["mean_iterations"] = float(found["iterations"][counted].mean())
+        row["max_iterations"] = int(found["iterations"][counted].max())
+    row["error"] = _error(model, motion, found["acceleration"], expected)
+    return row
+
+
+def _pass(evaluator: Any, motion: Motion, time_limit: float) -> dict[str, Any]:
+    evaluator.reset()
+    found: dict[str, Any] = evaluator.follow(
+        motion.times, motion.q, motion.v, motion.tau, passive=True, time_limit=time_limit
+    )
+    return found
+
+
+def _error(model: Model, motion: Motion, acceleration: Array, expected: Array) -> float | None:
+    count = len(acceleration)
+    q = motion.q[:count]
+    with np.errstate(all="ignore"):
+        off = acceleration - expected[:count]
+        if not np.isfinite(off).all():
+            return None
+        # T(q, a) = a^T H a / 2: the norm in which the constraint forces' error is measured too.
+        error, size = _core.kinetic_energy(model, q, off), _core.kinetic_energy(model, q, expected)
+    return float(np.sqrt(error.max() / size.max())) if size.max() > 0 else float(error.max())
+
+
+def _system(model: Model, motion: Motion) -> dict[str, Any]:
+    """The system A f = b: its size, and the worst of its conditioning at some states."""
+    places = np.linspace(0, motion.times.size - 1, _SPECTRUM_STATES).astype(int)
+    try:
+        systems = [_core.ConstraintSystem(model, motion.q[k]) for k in places]
+    except InputError as error:
+        return {
+            "unknowns": None,
+            "condition_estimate": None,
+            "spectral_radius": None,
+            "system_message": str(error),
+        }
+    spectra = [system.spectrum() for system in systems]
+    return {
+        "unknowns": systems[0].size,
+        "condition_estimate": max(s.condition for s in spectra),
+        "spectral_radius": max(s.radius for s in spectra),
+        "system_message": "",
+    }
+
+
+def plot(comparison: Mapping[str, Any]) -> str:
+    """Time a call of every solver and guess, as SVG."""
+    guesses = [entry["name"] for entry in _core.initial_guesses()]
+    labels: dict[str, list[Dot]] = {}
+    remarks: dict[str, str] = {}
+    for row in comparison["rows"]:
+        label = row["solver"] or row["method"]
+        dots = labels.setdefault(label, [])
+        if row["outcome"] != "converged":
+            remarks[label] = row["outcome"]
+        if row["seconds"] is not None:
+            series = guesses.index(row["initial_guess"]) + 1 if row["initial_guess"] else 0
+            dots.append(Dot(1e6 * row["seconds"], series, row["outcome"] == "converged"))
+    return dots_to_svg(
+        DotChart(
+            f"{comparison['model']}: time of one evaluation",
+            "time [us]; hollow: did not converge",
+            [(label, dots, remarks.get(label, "")) for label, dots in labels.items()],
+            ("no guess", *guesses),
+        )
+    )

@@ -1,0 +1,108 @@
+"""The 1993 paper, computed again: its tables and figures, ours beside theirs [sharf1993]."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import time as clock
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from linkwise import _core
+from linkwise.paper import chains, guesses, spectra, state_choice, table2
+from linkwise.paper.claims import judge_all
+from linkwise.paper.published import INTEGRATOR_TOLERANCE, TOLERANCE_RATIO
+from linkwise.paper.report import render
+from linkwise.record.provenance import versions
+
+__all__ = ["Step", "reproduce", "write_report"]
+
+
+class Step(NamedTuple):
+    """What is about to be computed, and how many of how many steps are done."""
+
+    what: str
+    done: int
+    total: int
+
+
+class _Counter:
+    def __init__(self, total: int, progress: Callable[[Step], object] | None) -> None:
+        self._done, self._total, self._progress = 0, total, progress
+
+    def __call__(self, what: str) -> None:
+        if self._progress is not None:
+            self._progress(Step(what, self._done, self._total))
+        self._done += 1
+
+
+def _plain(value: Any) -> Any:
+    """`value` in types that JSON has: NumPy's become Python's, what is not finite None."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def reproduce(
+    *, quick: bool = False, seed: int = 0, progress: Callable[[Step], object] | None = None
+) -> dict[str, Any]:
+    """All results as plain data. Times apart, they depend on `quick` and `seed` alone.
+
+    `quick` keeps chains short and times rough: under a minute instead of some minutes.
+    """
+    started = clock.perf_counter()
+    advance = _Counter(table2.count() + chains.count(quick) + guesses.count() + 2, progress)
+    results: dict[str, Any] = {
+        "quick": quick,
+        "seed": seed,
+        "made_by": {
+            "version": versions()["linkwise"],
+            "cpu_target": _core.cpu_target,
+            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        },
+        "table2": table2.table2(advance),
+        "fig2": (fig2 := chains.fig2(quick, seed, advance)),
+        "fig3": chains.fig3(fig2, quick, seed, advance),
+        "warm_start": guesses.warm_start(advance),
+        "stop_tests": guesses.stop_tests(advance),
+        "tolerance_ratios": guesses.tolerance_ratios(advance),
+        "state_choice": state_choice.state_choice(advance),
+    }
+    advance("spectra")
+    results["spectra"] = spectra.spectra()
+    results["printed_formula"] = spectra.printed_formula(INTEGRATOR_TOLERANCE * TOLERANCE_RATIO)
+    results["claims"] = judge_all(results)
+    results["run_seconds"] = clock.perf_counter() - started
+    plain: dict[str, Any] = _plain(results)
+    return plain
+
+
+def write_report(
+    directory: str | os.PathLike[str],
+    *,
+    quick: bool = False,
+    seed: int = 0,
+    progress: Callable[[Step], object] | None = None,
+) -> dict[str, Any]:
+    """Compute everything, write index.html and results.json to `directory`, return the results."""
+    folder = Path(directory)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _core.InputError(
+            f"{folder}: cannot be made a folder ({error.strerror}); name another"
+        ) from None
+    results = reproduce(quick=quick, seed=seed, progress=progress)
+    text = json.dumps(results, indent=1, allow_nan=False)
+    (folder / "results.json").write_text(text + "\n", encoding="utf-8")
+    (folder / "index.html").write_text(render(results), encoding="utf-8")
+    return results
