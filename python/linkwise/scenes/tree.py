@@ -82,4 +82,5 @@ def _fan(place: int, branching: int) -> np.ndarray:
     c, s, ct, st = np.cos(turn), np.sin(turn), np.cos(tilt), np.sin(tilt)
     about_z = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     about_y = np.array([[ct, 0, st], [0, 1, 0], [-st, 0, ct]])
-    return about_z @ about_y
+    rotation: np.ndarray = about_z @ about_y
+    return rotation
