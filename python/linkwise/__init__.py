@@ -37,6 +37,12 @@ _PUBLIC = {
     "solvers": "linkwise._core",
     "methods": "linkwise._core",
     "integrators": "linkwise._core",
+    "initial_guesses": "linkwise._core",
+    "stop_rules": "linkwise._core",
+    "solver_options": "linkwise._core",
+    "ConstraintSystem": "linkwise._core",
+    "Evaluator": "linkwise._core",
+    "Spectrum": "linkwise._core",
     "load": "linkwise.io.load",
     "Drive": "linkwise.drives",
     "Free": "linkwise.drives",
@@ -59,7 +65,9 @@ _SUBMODULES = ("drives", "scenes")
 
 __all__ = [
     "PD",
+    "ConstraintSystem",
     "Drive",
+    "Evaluator",
     "ForwardDynamicsResult",
     "Free",
     "InputError",
@@ -73,6 +81,7 @@ __all__ = [
     "Run",
     "SimulationError",
     "SimulationInterrupted",
+    "Spectrum",
     "Spring",
     "Table",
     "Torque",
@@ -81,6 +90,7 @@ __all__ = [
     "body_poses",
     "drives",
     "forward_dynamics",
+    "initial_guesses",
     "integrators",
     "inverse_dynamics",
     "inverse_dynamics_loads",
@@ -97,12 +107,16 @@ __all__ = [
     "run_scenario",
     "scenes",
     "simulate",
+    "solver_options",
     "solvers",
+    "stop_rules",
 ]
 
 if TYPE_CHECKING:
     from linkwise import drives, scenes
     from linkwise._core import (
+        ConstraintSystem,
+        Evaluator,
         ForwardDynamicsResult,
         InputError,
         Model,
@@ -110,9 +124,11 @@ if TYPE_CHECKING:
         Note,
         NumericsError,
         Report,
+        Spectrum,
         body_jacobian,
         body_poses,
         forward_dynamics,
+        initial_guesses,
         integrators,
         inverse_dynamics,
         inverse_dynamics_loads,
@@ -123,7 +139,9 @@ if TYPE_CHECKING:
         methods,
         momentum,
         potential_energy,
+        solver_options,
         solvers,
+        stop_rules,
     )
     from linkwise.drives import PD, Drive, Free, Locked, Spring, Table, Torque, Wrench
     from linkwise.io.load import load

@@ -158,6 +158,8 @@ def simulate(
     stop: str = "energy_norm",
     solver_tolerance: float | None = None,
     max_iterations: int | None = None,
+    solver_options: Mapping[str, Any] | None = None,
+    state: str = "joint_rates",
     step: float | None = None,
     max_step: float | None = None,
     threads: int | None = None,
@@ -193,6 +195,10 @@ def simulate(
         stop: Stopping test of an iterative solver: "energy_norm", "residual" or "paper".
         solver_tolerance: What that test compares with; follows `tolerance` by default.
         max_iterations: Most iterations of one solution.
+        solver_options: Further options of the solver by name, which go first:
+            linkwise.solver_options() lists them.
+        state: What is integrated beside the coordinates: "joint_rates", or "body_velocities", the
+            bodies' own velocities, as in the 1993 paper (method "constraint_force" only).
         step: Step of the fixed-step integrators [s].
         max_step: Longest step of the others [s].
         threads: Worker threads; the results do not depend on it.
@@ -230,6 +236,8 @@ def simulate(
         "stop": stop,
         "solver_tolerance": optional_number("solver_tolerance", solver_tolerance),
         "max_iterations": optional_count("max_iterations", max_iterations),
+        "solver_options": None if solver_options is None else dict(solver_options),
+        "state": state,
         "step": optional_number("step", step),
         "max_step": optional_number("max_step", max_step),
         "threads": optional_count("threads", threads),
