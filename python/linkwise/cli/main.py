@@ -9,6 +9,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from linkwise.cli.compare import compare
+from linkwise.cli.bench import bench
 from linkwise.cli.demo import demo
 from linkwise.cli.inspect import inspect
 from linkwise.cli.output import DONE, FAILED, WRONG_INPUT, print_json, say
@@ -26,6 +27,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command()(compare)
+app.command()(bench)
 app.command()(demo)
 app.command()(inspect)
 app.command()(paper)

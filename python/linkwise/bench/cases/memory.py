@@ -1,0 +1,32 @@
+"""Chains of up to a million links: time and memory a link, every engine as far as it goes."""
+
+from __future__ import annotations
+
+from linkwise.bench.engines.base import Offer
+from linkwise.bench.machine import hanging_chain, states_for
+from linkwise.bench.pits import PYTHON, Pits
+from linkwise.bench.race import race
+from linkwise.bench.rows import Row
+
+SIZES, QUICK_SIZES = (1000, 10_000, 100_000, 1_000_000), (1000, 100_000)
+#: Writing a longer chain for the peers takes minutes, and none of them gets this far.
+LONGEST_FOR_PEERS = 100_000
+
+
+def wanted(engine: str, _arena: str, offer: Offer) -> bool:
+    """One method an engine, so that the memory is that of this method."""
+    if engine == "linkwise":
+        return offer.method == "auto"
+    return offer.method in ("aba, local", "mj_forward", "aba")
+
+
+def run(pits: Pits) -> list[Row]:
+    pits.forget_sizes()
+    rows: list[Row] = []
+    for n in QUICK_SIZES if pits.effort.quick else SIZES:
+        pits.say(f"memory: chain of {n}")
+        peers = n <= (1000 if pits.effort.quick else LONGEST_FOR_PEERS)
+        machine = hanging_chain(n, peers=peers)
+        states = states_for(n, most=16)
+        rows += race(pits, "memory", machine, states=states, wanted=wanted, arenas=[PYTHON])
+    return rows

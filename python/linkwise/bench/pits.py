@@ -1,0 +1,141 @@
+"""The workers of a run, kept from machine to machine; what failed is started anew."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from linkwise.bench.engines.table import ENGINES, Engine
+from linkwise.bench.process import Worker, compiled_worker, python_worker
+
+CPP, PYTHON = "C++", "Python"
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long a run may take."""
+
+    quick: bool
+    rounds: int
+    turn: float  # seconds of each contestant a round
+    slowest: float  # seconds that one call may take
+    build: float  # seconds that preparing an engine may take
+    fewest_rounds: int
+    patience: float  # seconds that all turns of one contestant may take
+
+
+QUICK = Effort(True, rounds=5, turn=0.01, slowest=1, build=5, fewest_rounds=2, patience=0.5)
+FULL = Effort(False, rounds=15, turn=0.05, slowest=30, build=120, fewest_rounds=3, patience=20)
+
+
+@dataclass
+class Pits:
+    memory: int  # bytes that a worker may take
+    program: Path | None  # the compiled worker
+    effort: Effort
+    say: Callable[[str], object]
+    compiled: frozenset[str] = frozenset()  # engines that the program was compiled with
+    engines: tuple[Engine, ...] = ENGINES
+    _workers: dict[tuple[str, str, bool], Worker] = field(default_factory=dict)
+    _sizes: dict[tuple[str, str], dict[int, int]] = field(default_factory=dict)
+
+    def arenas(self, engine: Engine) -> list[str]:
+        if not engine.installed:
+            return []
+        return [PYTHON, CPP] if engine.name in self.compiled else [PYTHON]
+
+    def worker(self, engine: Engine, arena: str, *, threads: bool = False) -> Worker:
+        key = engine.name, arena, threads
+        if key not in self._workers or not self._workers[key].alive:
+            if arena == CPP:
+                assert self.program is not None
+                made = compiled_worker(self.program, engine.name, memory=self.memory)
+            else:
+                made = python_worker(engine.name, memory=self.memory, threads=threads)
+            self._workers[key] = made
+        return self._workers[key]
+
+    def forecast(self, engine: Engine, arena: str, n: int) -> float:
+        """Bytes for n bodies, by the power law through the last two sizes of this case."""
+        known = sorted(self._sizes.get((engine.name, arena), {}).items())
+        if len(known) < 2 or n <= known[-1][0]:
+            return 0.0
+        (n0, m0), (n1, m1) = known[-2:]
+        if m1 <= m0:
+            return float(m1)
+        power = np.log(m1 / m0) / np.log(n1 / n0)
+        return float(m1 * (n / n1) ** min(float(power), 3.0))
+
+    def weigh(self, engine: Engine, arena: str, n: int, worker: Worker) -> None:
+        self._sizes.setdefault((engine.name, arena), {})[n] = int(
+            worker.ask("memory", timeout=5)["peak"]
+        )
+
+    def forget_sizes(self) -> None:
+        """Another family of machines begins."""
+        self._sizes.clear()
+
+    def close(self) -> None:
+        for worker in self._workers.values():
+            worker.close()
+        self._workers.clear()
+
+    def __enter__(self) -> Pits:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+@dataclass
+class Box:
+    """One engine in one arena with one machine; built again when its worker had to be ended."""
+
+    pits: Pits
+    engine: Engine
+    arena: str
+    folder: Path
+    threads: bool = False
+    build_seconds: float = 0.0
+    _before: int = 0
+    _built: Worker | None = None
+
+    def build(self) -> dict[str, Any]:
+        worker = self.pits.worker(self.engine, self.arena, threads=self.threads)
+        worker.ask("clear", timeout=self.pits.effort.build)
+        self._before = int(worker.ask("memory", timeout=5)["resident"])
+        start = time.perf_counter()
+        answer = worker.ask("build", str(self.folder), timeout=self.pits.effort.build)
+        self.build_seconds = time.perf_counter() - start
+        self._built = worker
+        return answer
+
+    def held(self) -> int:
+        """Bytes that the machine has added to its worker, the states for the timing left out."""
+        use = self.ask("memory", timeout=5)
+        return int(use["resident"]) - self._before - int(use.get("states", 0))
+
+    def ask(self, *lines: str, timeout: float) -> dict[str, Any]:
+        if self._built is None or not self._built.alive:
+            self.build()
+        assert self._built is not None
+        return self._built.ask(*lines, timeout=timeout)
+
+    def weigh(self, n: int) -> None:
+        assert self._built is not None
+        self.pits.weigh(self.engine, self.arena, n, self._built)
+
+    def too_big(self, n: int) -> str:
+        """Why n bodies are not even tried, or nothing."""
+        needed, allowed = self.pits.forecast(self.engine, self.arena, n), self.pits.memory
+        if needed <= allowed:
+            return ""
+        return (
+            f"would need {needed / 2**30:.0f} GiB of memory, by its smaller sizes; "
+            f"{allowed / 2**30:.0f} GiB allowed"
+        )
