@@ -19,6 +19,7 @@ from linkwise.view.shapes import (
     Mesh,
     equivalent_boxes,
     quaternions,
+    turned,
     turning_z_to,
     unit_arc,
     unit_arrow,
@@ -194,20 +195,20 @@ class Scene:
                     toggle, shown, unit_box(), chosen.size, batched_scales=edges, **style
                 )
                 self._layers[toggle].append(Layer(handle, _following(chosen, offsets[chosen])))
+        few = model.n_joints <= _MANY
         outboard = np.flatnonzero(inboard >= 0)
         thick = self._thickness()
         if outboard.size:
             handle = self._add(
                 "Bodies",
                 bare,
-                unit_cylinder(8),
+                unit_cylinder(8) if few else turned([(1, -0.5), (1, 0.5)], 4),
                 outboard.size,
                 batched_scales=np.ones((outboard.size, 3)),
                 batched_colors=_ROD_TONE,
             )
             ends = (inboard[outboard], outboard)
             self._layers["Bodies"].append(Layer(handle, _spanning(ends, 0.55 * thick)))
-        few = model.n_joints <= _MANY
         if not few:  # lines keep their width on the screen, however far away they are
             lines = self._scene.add_line_segments(
                 "/bodies/lines",

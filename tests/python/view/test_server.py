@@ -6,9 +6,11 @@ import socket
 import numpy as np
 import pytest
 
+import linkwise as lw
 from linkwise.view.export import frame_samples, write_html
+from linkwise.view.scene import Scene
 from linkwise.view.server import running
-from linkwise.view.source import Options, open_source
+from linkwise.view.source import Looks, Options, Source, open_source, static_loads
 
 pytest.importorskip("viser", reason="the view needs viser: pip install '.[view]'")
 
@@ -61,3 +63,20 @@ def test_frames_are_even_in_time_and_bounded():
     assert np.ptp(np.diff(few)) <= 1
     assert frame_samples(times, 10_000).size < 200
     assert frame_samples(np.array([0.5]), 6).tolist() == [0]
+
+
+def test_ten_thousand_links_take_one_message_a_group():
+    model = lw.scenes.chain(10_000)
+    source = Source("chain", model, Looks([], [], []))
+    with running("127.0.0.1", 0, "chain") as server:
+        scene = Scene(server, source)
+        for name in scene.toggles:
+            scene.toggle(name, True)
+        scene.set_largest(1e5, 1.0)
+        q = np.full(model.nq, 1e-4)
+        sent = []
+        server._websock_server.queue_message = sent.append
+        scene.show(scene.at(q, static_loads(model, q)))
+    assert 5 < len(sent) < 25
+    marks = scene.joint_marks.batched_positions
+    assert marks == pytest.approx(lw.body_poses(model, q)[:, :3, 3], rel=1e-6, abs=1e-3)
