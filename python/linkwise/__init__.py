@@ -34,6 +34,7 @@ _PUBLIC = {
     "body_poses": "linkwise._core",
     "link_poses": "linkwise._core",
     "body_jacobian": "linkwise._core",
+    "passive_torque": "linkwise._core",
     "solvers": "linkwise._core",
     "methods": "linkwise._core",
     "integrators": "linkwise._core",
@@ -47,6 +48,7 @@ _PUBLIC = {
     "Drive": "linkwise.drives",
     "Free": "linkwise.drives",
     "Locked": "linkwise.drives",
+    "Motion": "linkwise.drives",
     "PD": "linkwise.drives",
     "Spring": "linkwise.drives",
     "Table": "linkwise.drives",
@@ -60,8 +62,9 @@ _PUBLIC = {
     "open_run": "linkwise.record.read",
     "run_scenario": "linkwise.simulation",
     "simulate": "linkwise.simulation",
+    "sweep": "linkwise.sweeping",
 }
-_SUBMODULES = ("drives", "scenes")
+_SUBMODULES = ("drives", "loads", "scenes")
 
 __all__ = [
     "PD",
@@ -74,6 +77,7 @@ __all__ = [
     "Locked",
     "Model",
     "ModelBuilder",
+    "Motion",
     "Note",
     "NumericsError",
     "Progress",
@@ -99,10 +103,12 @@ __all__ = [
     "link_poses",
     "load",
     "load_scenario",
+    "loads",
     "mass_matrix",
     "methods",
     "momentum",
     "open_run",
+    "passive_torque",
     "potential_energy",
     "run_scenario",
     "scenes",
@@ -110,10 +116,11 @@ __all__ = [
     "solver_options",
     "solvers",
     "stop_rules",
+    "sweep",
 ]
 
 if TYPE_CHECKING:
-    from linkwise import drives, scenes
+    from linkwise import drives, loads, scenes
     from linkwise._core import (
         ConstraintSystem,
         Evaluator,
@@ -138,17 +145,19 @@ if TYPE_CHECKING:
         mass_matrix,
         methods,
         momentum,
+        passive_torque,
         potential_energy,
         solver_options,
         solvers,
         stop_rules,
     )
-    from linkwise.drives import PD, Drive, Free, Locked, Spring, Table, Torque, Wrench
+    from linkwise.drives import PD, Drive, Free, Locked, Motion, Spring, Table, Torque, Wrench
     from linkwise.io.load import load
     from linkwise.record.read import open_run
     from linkwise.result import Run
     from linkwise.scenario import load_scenario
     from linkwise.simulation import SimulationError, SimulationInterrupted, run_scenario, simulate
+    from linkwise.sweeping import sweep
     from linkwise.time_loop import Progress
 
 

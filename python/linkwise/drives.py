@@ -6,12 +6,16 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
+from linkwise.motion_table import LEAST_ROWS, NAMES, find_jump
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
 
 Array = npt.NDArray[np.float64]
 Interpolation = Literal["linear", "cubic"]
@@ -99,8 +103,61 @@ class Table:
         return cls(table.times, values, interpolation)
 
 
+def check_smooth(table: Table) -> None:
+    """InputError where a table of positions cannot be differentiated twice."""
+    if table.interpolation != "cubic":
+        raise InputError(
+            "motion: the velocity of a linear table jumps at every row; use interpolation cubic"
+        )
+    if len(table.times) < LEAST_ROWS:
+        raise InputError(
+            f"motion: the table has {len(table.times)} rows; give at least {LEAST_ROWS}, so that "
+            "its derivatives can be checked"
+        )
+    for column in range(table.values.shape[1]):
+        jump = find_jump(table.times, table.values[:, column])
+        if jump is not None:
+            which = f" of column {column + 1}" if table.values.shape[1] > 1 else ""
+            raise InputError(
+                f"motion: the {NAMES[jump.derivative]}{which} jumps by about {jump.size:.3g} near "
+                f"t = {jump.time:.6g} s; give a smoother motion, or rows closer together"
+            )
+
+
+def check_derivatives(motion: Callable[[float], Any], times: Array) -> Array:
+    """Positions (n, k) of a motion at these times; InputError unless it returns its derivatives."""
+    rows = []
+    for time in times:
+        returned = motion(float(time))
+        if not isinstance(returned, tuple | list) or len(returned) != 3:
+            raise InputError(
+                f"motion: at t = {time:g} s the function returns no three values; return position, "
+                "velocity and acceleration"
+            )
+        parts = [np.atleast_1d(_finite(part, f"motion at t = {time:g} s")) for part in returned]
+        if len({part.shape for part in parts}) != 1 or parts[0].ndim != 1:
+            raise InputError(f"motion: at t = {time:g} s its three values have different shapes")
+        rows.append(np.stack(parts))
+    values = np.stack(rows)
+    for k in (1, 2):
+        # Simpson's rule on pairs of intervals; a motion may have corners, but not everywhere.
+        change = values[2::2, k - 1] - values[:-2:2, k - 1]
+        width = (times[2::2] - times[:-2:2])[:, None]
+        mean = (values[:-2:2, k] + 4 * values[1::2, k] + values[2::2, k]) / 6
+        wrong = np.abs(change - width * mean) > 1e-2 * np.abs(values[:, k]).max() * width + 1e-9
+        if wrong.mean() > 0.5:
+            raise InputError(
+                f"motion: its {NAMES[k]} is not the derivative of its {NAMES[k - 1]}; "
+                "return all three of one motion"
+            )
+    return values[:, 0]
+
+
 class Drive(ABC):
     """What moves or holds one joint."""
+
+    def check(self, model: Model, joint: str, end: float) -> None:  # noqa: B027
+        """InputError where the drive does not fit the joint, or a simulation from 0 to `end`."""
 
     @abstractmethod
     def apply(self, simulation: Any, joint: str) -> None:
@@ -188,6 +245,66 @@ class Spring(Drive):
 
     def apply(self, simulation: Any, joint: str) -> None:
         simulation.drive_pd(joint, self.stiffness, self.damping, self.rest)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion(Drive):
+    """The joint follows a given motion exactly; its load holds the drive torque that this takes.
+
+    value: a cubic Table of positions [rad, m], one column a degree of freedom, that covers the
+        whole simulation; or a function ``value(t)`` that returns position, velocity and
+        acceleration. The joint starts on the motion, whatever the initial state says.
+
+    Tables whose position, velocity or acceleration jumps are refused: the load would be that of
+    the interpolation, not of the motion.
+    """
+
+    value: Table | Callable[[float], tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]]
+
+    def __post_init__(self) -> None:
+        if isinstance(self.value, Table):
+            check_smooth(self.value)
+        elif not callable(self.value):
+            raise InputError(
+                "motion: is neither a Table nor a function; to hold a joint still use Locked"
+            )
+
+    def check(self, model: Model, joint: str, end: float) -> None:
+        dofs = model.v_slice(joint)
+        if isinstance(self.value, Table):
+            first, last = self.value.times[0], self.value.times[-1]
+            if first > 0 or last < end * (1 - 1e-12):
+                raise InputError(
+                    f"motion: the table covers {first:g} to {last:g} s, the simulation 0 to "
+                    f"{end:g} s; give rows for all of it"
+                )
+            when, positions = self.value.times, self.value.values
+        else:
+            when = np.linspace(0.0, end, 257)
+            positions = check_derivatives(self.value, when)
+        if positions.shape[1] != dofs.stop - dofs.start:
+            raise InputError(
+                f"motion: gives {positions.shape[1]} positions for {dofs.stop - dofs.start} "
+                "degrees of freedom"
+            )
+        lower, upper = model.lower_limit[dofs], model.upper_limit[dofs]
+        slack = 1e-9 * (1 + np.abs(positions).max())
+        out = np.argwhere((positions < lower - slack) | (positions > upper + slack))
+        if out.size:
+            row, column = out[0]
+            raise InputError(
+                f"motion: leaves the joint's limits {lower[column]:g} .. {upper[column]:g} at "
+                f"t = {when[row]:g} s ({positions[row, column]:g}); give a motion within them"
+            )
+
+    def apply(self, simulation: Any, joint: str) -> None:
+        if isinstance(self.value, Table):
+            table = self.value
+            simulation.drive_motion_table(
+                joint, table.times, table.values, interpolation=table.interpolation
+            )
+        else:
+            simulation.drive_motion_callable(joint, self.value)
 
 
 @dataclass(frozen=True)

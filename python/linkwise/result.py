@@ -14,6 +14,9 @@ from linkwise._core import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
+    from linkwise._core import Model
+    from linkwise.plots import RunPlots
+
 # Samples of joint loads looked at in one go, in bytes: a run may be larger than memory.
 _BLOCK_BYTES = 64 << 20
 
@@ -31,9 +34,15 @@ class Run:
         path: The Zarr store it is read from, None for a run in memory.
     """
 
-    def __init__(self, dataset: xr.Dataset, path: str | os.PathLike[str] | None = None) -> None:
+    def __init__(
+        self,
+        dataset: xr.Dataset,
+        path: str | os.PathLike[str] | None = None,
+        model: Model | None = None,
+    ) -> None:
         self.dataset = dataset
         self.path = None if path is None else Path(path)
+        self._model = model
 
     def __getattr__(self, name: str) -> Any:
         # Only called for what Run itself lacks; while unpickling there is no dataset yet.
@@ -97,6 +106,27 @@ class Run:
         if self.path is not None:
             lines.append(f"  stored in   {self.path}")
         return lines
+
+    def load_model(self) -> Model:
+        """The machine that was simulated.
+
+        Raises:
+            InputError: the run does not hold it.
+        """
+        if self._model is None:
+            if self.path is None:
+                raise InputError("run does not hold its model; give the model as well")
+            from linkwise.record.machine import read_model
+
+            self._model = read_model(self.path)
+        return self._model
+
+    @property
+    def plot(self) -> RunPlots:
+        """Figures of this run: `run.plot.loads("elbow")`, `.split("elbow")`, `.energy()`."""
+        from linkwise.plots import RunPlots
+
+        return RunPlots(self)
 
     def peak_loads(self) -> xr.Dataset:
         """Largest force and moment that each joint carries, and when.

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from linkwise import _core
 from linkwise._core import InputError
 from linkwise.arguments import number, optional_count, optional_number, sample_times, state_vector
-from linkwise.drives import as_drive, as_wrench
+from linkwise.drives import Motion, as_drive, as_wrench
 from linkwise.io.complaint import near
 from linkwise.record.claim import check_target
 from linkwise.record.memory import MemoryRecord
@@ -97,6 +97,7 @@ def _recorder(
 
 
 def _record(
+    model: Model,
     simulation: Simulation,
     record: MemoryRecord | RunWriter,
     schema: Schema,
@@ -114,7 +115,7 @@ def _record(
             record.finish(said)
         raise
     finished = record.finish(_attributes_at_end(ending, clock.monotonic() - started))
-    return Run(finished, record.path), ending
+    return Run(finished, record.path, model), ending
 
 
 def _attributes_at_end(ending: Ending, wall_time: float) -> dict[str, Any]:
@@ -200,10 +201,10 @@ def simulate(
         state: What is integrated beside the coordinates: "joint_rates", or "body_velocities", the
             bodies' own velocities, as in the 1993 paper (method "constraint_force" only).
         step: Step of the fixed-step integrators [s].
-        max_step: Longest step of the others [s].
+        max_step: Longest step of the others [s]; with given motions a fiftieth of the duration.
         threads: Worker threads; the results do not depend on it.
         quantities: What to record, of "position", "velocity", "acceleration", "joint_load",
-            "drive_torque", "energy", "statistics"; all by default.
+            "drive_torque", "external_wrench", "energy", "statistics"; all by default.
         joints: Names of the joints to record; all by default.
         output: Path of a Zarr store to write while simulating; in memory when left out. An
             existing linkwise run there is replaced, anything else is refused.
@@ -221,8 +222,8 @@ def simulate(
         state_vector("q0", q0, model.nq, model.neutral_configuration()),
         state_vector("v0", v0, model.nv, np.zeros(model.nv)),
     )
-    schema = build_schema(model, quantities, joints)
     by_joint, by_body = _check_driven(model, drives, wrenches)
+    schema = build_schema(model, quantities, joints, by_body)
     if on_failure not in ("raise", "return"):
         raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
     if output is not None:
@@ -242,6 +243,14 @@ def simulate(
         "max_step": optional_number("max_step", max_step),
         "threads": optional_count("threads", threads),
     }
+    if max_step is None and any(isinstance(drive, Motion) for drive in by_joint.values()):
+        # Joints at rest would let the steps grow until they pass over a whole short motion.
+        options["max_step"] = float(sampled[-1]) / 50 or None
+    for joint, drive in by_joint.items():
+        try:
+            drive.check(model, joint, float(sampled[-1]))
+        except InputError as error:
+            raise InputError(f"drives[{joint!r}]: {error}") from None
     simulation = _core.Simulation(model, **options)
     for joint, drive in by_joint.items():
         drive.apply(simulation, joint)
@@ -256,7 +265,7 @@ def simulate(
     )
     attrs |= _chosen(simulation, by_joint, by_body)
     record = _recorder(model, schema, attrs, sampled.size, output)
-    run, ending = _record(simulation, record, schema, sampled, progress)
+    run, ending = _record(model, simulation, record, schema, sampled, progress)
     if on_failure == "raise":
         raise_failure(model, ending, run)
     return run

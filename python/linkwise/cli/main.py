@@ -12,9 +12,11 @@ from linkwise.cli.compare import compare
 from linkwise.cli.bench import bench
 from linkwise.cli.demo import demo
 from linkwise.cli.inspect import inspect
+from linkwise.cli.loads import loads
 from linkwise.cli.output import DONE, FAILED, WRONG_INPUT, print_json, say
 from linkwise.cli.paper import paper
 from linkwise.cli.run import run
+from linkwise.cli.sweep import sweep
 from linkwise.cli.view import view
 
 app = typer.Typer(
@@ -30,8 +32,10 @@ app.command()(compare)
 app.command()(bench)
 app.command()(demo)
 app.command()(inspect)
+app.command()(loads)
 app.command()(paper)
 app.command()(run)
+app.command()(sweep)
 app.command()(view)
 
 # Typer re-exports BadParameter, a UsageError, which is a ClickException: the class of every

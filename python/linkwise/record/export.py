@@ -74,7 +74,9 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         timed = [v for v in dataset.data_vars.values() if "time" in v.dims]
         for where in _blocks(timed) if timed else ():
             for array in timed:
-                file.variables[str(array.name)][where] = array[where].values
+                # Sweeps have their members before the time.
+                place = tuple(where if dim == "time" else slice(None) for dim in array.dims)
+                file.variables[str(array.name)][place] = array[place].values
     return target
 
 

@@ -26,6 +26,7 @@ QUANTITIES = (
     "acceleration",
     "joint_load",
     "drive_torque",
+    "external_wrench",
     "energy",
     "statistics",
 )
@@ -37,6 +38,13 @@ _LOAD_ATTRS = {
     "frame": "joint frame, fixed in the outboard body",
     "point": "joint point: the origin of the joint frame",
     "convention": "wrench that the inboard body exerts on the outboard body through the joint",
+}
+_WRENCH_ATTRS = {
+    "long_name": "external wrench",
+    "units": "N (fx, fy, fz), N m (nx, ny, nz)",
+    "frame": "joint frame, fixed in the body",
+    "point": "origin of the joint frame",
+    "convention": "wrench that acts on the body from outside, by the wrenches of the simulation",
 }
 _SCALAR_ATTRS: dict[str, dict[str, str]] = {
     "position": {
@@ -117,7 +125,15 @@ class Schema:
 
 
 # The order in which a dataset lists its variables.
-ORDER = (*_SCALAR_ATTRS, "joint_load", *_ENERGY_ATTRS, *_COUNTS, "step_size", "order")
+ORDER = (
+    *_SCALAR_ATTRS,
+    "joint_load",
+    "external_wrench",
+    *_ENERGY_ATTRS,
+    *_COUNTS,
+    "step_size",
+    "order",
+)
 TIME_ATTRS = {"long_name": "time", "units": "s"}
 
 
@@ -219,18 +235,47 @@ def _joint_variables(
     return variables, coordinates
 
 
+def _wrench_variable(
+    model: Model, wrenched: Collection[str], coordinates: dict[str, Coordinate]
+) -> Variable:
+    """The wrenches on the bodies that have any; the others would be columns of zeros."""
+    names = model.body_names
+    bodies = [k for k in range(model.n_joints) if names[k] in wrenched]
+    coordinates["wrenched_body"] = Coordinate(
+        ("wrenched_body",), text_array(names[k] for k in bodies)
+    )
+    coordinates["component"] = Coordinate(("component",), text_array(COMPONENTS))
+    take = np.array(bodies, dtype=np.intp)
+    shape, real = (len(bodies), len(COMPONENTS)), np.dtype(np.float64)
+    return Variable(
+        "external_wrench", ("wrenched_body", "component"), shape, real, _WRENCH_ATTRS, take
+    )
+
+
 def build_schema(
     model: Model,
     quantities: Collection[str] | None = None,
     joints: Sequence[str] | None = None,
+    wrenched: Collection[str] = (),
 ) -> Schema:
-    """Describe a run of `model` that keeps these quantities of these joints."""
+    """Describe a run of `model` that keeps these quantities of these joints.
+
+    `wrenched` names the bodies with an external wrench, which is recorded for them alone.
+    """
     kept = resolve_quantities(quantities)
+    if not wrenched:
+        kept = tuple(name for name in kept if name != "external_wrench")
     selected = resolve_joints(model, joints)
     variables: list[Variable] = []
     coordinates: dict[str, Coordinate] = {}
-    if not set(kept) <= {"energy", "statistics"}:  # labels of a million joints take seconds
+    if not set(kept) <= {
+        "energy",
+        "statistics",
+        "external_wrench",
+    }:  # labels of a million joints take seconds
         variables, coordinates = _joint_variables(model, kept, selected)
+    if "external_wrench" in kept:
+        variables.append(_wrench_variable(model, wrenched, coordinates))
     if "energy" in kept:
         real = np.dtype(np.float64)
         variables += [Variable(name, (), (), real, attrs) for name, attrs in _ENERGY_ATTRS.items()]

@@ -4,6 +4,20 @@ Read as untrusted input, like everything in :mod:`linkwise.io`; a package of its
 brings models, drives and results together.
 """
 
-from linkwise.scenario.read import Scenario, load_scenario
+from linkwise.scenario.read import (
+    Scenario,
+    load_ratings,
+    load_scenario,
+    parse_axis,
+    ratings_in,
+    variant,
+)
 
-__all__ = ["Scenario", "load_scenario"]
+__all__ = [
+    "Scenario",
+    "load_ratings",
+    "load_scenario",
+    "parse_axis",
+    "ratings_in",
+    "variant",
+]

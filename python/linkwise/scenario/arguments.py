@@ -16,11 +16,14 @@ from linkwise._core import InputError, Model, integrators, methods, solvers
 from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.table import CsvTable, read_table
 from linkwise.io.units import check_dimension
+from linkwise.loads.rating import Rating
 from linkwise.record.labels import joint_scalars
 from linkwise.record.schema import QUANTITIES
 from linkwise.scenario.schema import (
     FreeSection,
+    LinkSection,
     LockedSection,
+    MotionSection,
     PDSection,
     Quantity,
     ScenarioFile,
@@ -175,6 +178,10 @@ class ArgumentBuilder:
                     self._one(section.rest, units, (*keys, "rest"), "position"),
                 )
             return self._pd(joint, section, units, keys)
+        if isinstance(section, MotionSection):
+            names = self._columns(section.table, section.column, section.columns, joint, keys)
+            table = self._table(section.table, names, units, "cubic", keys, "position")
+            return self._make(keys, drives.Motion, table)
         assert isinstance(section, LockedSection | FreeSection)
         return drives.Locked() if isinstance(section, LockedSection) else drives.Free()
 
@@ -195,6 +202,14 @@ class ArgumentBuilder:
         names = self._columns(section.table, section.column, section.columns, joint, keys)
         table = self._table(section.table, names, units, section.interpolation, keys, "position")
         return self._make(keys, drives.PD, kp, kd, table)
+
+    def ratings(self) -> dict[str, Rating]:
+        """Ratings by joint name."""
+        found = {}
+        for joint, section in self.source.settings.rating.items():
+            self._check_joint(joint, ("rating", joint))
+            found[joint] = Rating(**section.model_dump())
+        return found
 
     def body_wrenches(self) -> dict[str, drives.Wrench]:
         """External wrenches by body name."""
@@ -323,6 +338,43 @@ class ArgumentBuilder:
 
     def _one(self, value: Quantity, units: list[str], keys: Sequence[str], kind: str) -> float:
         return float(self._fit(value, units, keys, _KINDS[kind])[0])
+
+
+def with_inertias(source: ScenarioSource, model: Model) -> Model:
+    """The model with the payloads and the changed links of the scenario."""
+    for name, link in source.settings.link.items():
+        _check_link(source, model, name, ("link", name))
+        try:
+            model = model.with_link(name, mass=link.mass, com=link.com, inertia=_tensor(link))
+        except InputError as error:
+            source.complain(("link", name), str(error), "correct its inertial data")
+    for name, payload in source.settings.payload.items():
+        keys = ("payload", name)
+        _check_link(source, model, payload.link, (*keys, "link"))
+        try:
+            model = model.with_payload(
+                payload.link,
+                mass=payload.mass,
+                com=payload.com,
+                inertia=_tensor(payload),
+                name=name,
+            )
+        except InputError as error:
+            source.complain(keys, str(error), "correct its name or its inertial data")
+    return model
+
+
+def _check_link(source: ScenarioSource, model: Model, link: str, keys: Sequence[str]) -> None:
+    if link not in model.link_names:
+        remedy = near(link, model.link_names, "the links are")
+        source.complain(keys, f"the model has no link '{shorten(link)}'", remedy)
+
+
+def _tensor(section: LinkSection) -> npt.NDArray[np.float64] | None:
+    if section.inertia is None:
+        return None
+    xx, yy, zz, xy, xz, yz = [*section.inertia, 0.0, 0.0, 0.0][:6]
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _allowed(unit: str, kinds: tuple[str, str]) -> tuple[str, ...]:

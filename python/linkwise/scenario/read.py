@@ -6,7 +6,7 @@ import inspect
 import os
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -17,8 +17,14 @@ from linkwise._core import InputError, Model
 from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.files import SCENARIO_BYTES, read_bytes
 from linkwise.io.load import load
-from linkwise.scenario.arguments import ArgumentBuilder, ScenarioSource, key_path
-from linkwise.scenario.schema import ScenarioFile, describe, keys_at
+from linkwise.loads.rating import Rating
+from linkwise.scenario.arguments import (
+    ArgumentBuilder,
+    ScenarioSource,
+    key_path,
+    with_inertias,
+)
+from linkwise.scenario.schema import RatingsFile, ScenarioFile, describe, keys_at
 
 # tomllib takes time quadratic in the parts of a dotted key: minutes for a file of 100 kB.
 _PART = r"""(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')"""
@@ -35,7 +41,14 @@ class Scenario(ScenarioSource):
     text: str
 
     def load_model(self) -> Model:
-        """The machine. Raises InputError if it cannot be had."""
+        """The machine with its payloads. Raises InputError if it cannot be had."""
+        return with_inertias(self, self._bare_model())
+
+    def ratings(self, model: Model) -> dict[str, Rating]:
+        """What the joints may carry, by name. InputError for unknown joints."""
+        return ArgumentBuilder(self, model).ratings()
+
+    def _bare_model(self) -> Model:
         source, settings = self.settings.model, self.settings
         if source.path is not None:
             return load(
@@ -60,6 +73,7 @@ class Scenario(ScenarioSource):
         """Keyword arguments of linkwise.simulate. InputError for joints, bodies, columns or units
         that do not fit the model."""
         builder = ArgumentBuilder(self, model)
+        builder.ratings()  # used by those who read the run, wrong ones are found now
         output = self.settings.output
         return {
             **builder.simulate(),
@@ -98,7 +112,95 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
     Raises InputError, in one line that names file, key and remedy, for anything that is not
     valid TOML, unknown keys, wrong types or units, numbers that are not finite or out of range.
     """
-    data = read_bytes(path, "scenario", SCENARIO_BYTES)
+    text, document = _read_toml(path, read_bytes(path, "scenario", SCENARIO_BYTES))
+    if isinstance(document.get("model"), str):
+        document["model"] = {"path": document["model"]}
+    try:
+        settings = ScenarioFile.model_validate(document)
+    except ValidationError as error:
+        _complain_first(path, error)
+    return Scenario(Path(path), settings, text)
+
+
+def variant(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
+    """The scenario with other values, by dotted key: {"payload.box.mass": 5}.
+
+    Raises InputError for keys and values that a scenario does not take.
+    """
+    document = tomllib.loads(scenario.text)
+    if isinstance(document.get("model"), str):
+        document["model"] = {"path": document["model"]}
+    for key, value in changes.items():
+        *tables, last = _parts(key)
+        place = document
+        for name in tables:
+            place = place.setdefault(name, {})
+            if not isinstance(place, dict):
+                complain(scenario.path, key, f"'{shorten(name)}' is no table", "correct the key")
+        place[last] = value
+    try:
+        settings = ScenarioFile.model_validate(document)
+    except ValidationError as error:
+        _complain_first(scenario.path, error)
+    said = ", ".join(f"{key} = {value!r}" for key, value in changes.items())
+    text = f"{scenario.text.rstrip()}\n\n# changed: {' '.join(said.split())}\n"
+    return Scenario(scenario.path, settings, text)
+
+
+def _parts(key: str) -> list[str]:
+    """The names in a dotted key, as TOML reads it."""
+    try:
+        place: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None
+    except tomllib.TOMLDecodeError:
+        place = None
+    found = []
+    while isinstance(place, dict) and len(place) == 1:
+        ((name, place),) = place.items()
+        found.append(name)
+    if not found or place != 0:
+        raise InputError(f"key {shorten(key)!r}: is not a key; write it as payload.box.mass")
+    return found
+
+
+def parse_axis(text: str) -> tuple[str, list[Any]]:
+    """Key and values of a sweep's axis, written KEY=[VALUE, VALUE, ...] in TOML."""
+    key, _, values = text.partition("=")
+    try:
+        found = tomllib.loads(f"values = {values}")["values"] if "\n" not in values else None
+    except (tomllib.TOMLDecodeError, KeyError):
+        found = None
+    if not isinstance(found, list) or not found:
+        raise InputError(
+            f"{shorten(text)!r}: is no axis of a sweep; write KEY=[VALUE, VALUE], such as "
+            "payload.box.mass=[0, 5, 10]"
+        )
+    _parts(key)
+    return key.strip(), found
+
+
+def load_ratings(path: str | os.PathLike[str]) -> dict[str, Rating]:
+    """The [rating.JOINT] tables of a TOML file, which may be a whole scenario, by joint name."""
+    return _ratings(path, read_bytes(path, "ratings", SCENARIO_BYTES))
+
+
+def ratings_in(scenario_text: str) -> dict[str, Rating]:
+    """The ratings in the text of a scenario, such as a run keeps."""
+    return _ratings("scenario of the run", scenario_text.encode("utf-8"))
+
+
+def _ratings(path: str | os.PathLike[str], data: bytes) -> dict[str, Rating]:
+    _, document = _read_toml(path, data)
+    if "simulate" not in document and set(document) - {"rating"}:
+        key = sorted(set(document) - {"rating"})[0]
+        complain(path, key_path([key]), "unknown key", "give [rating.JOINT] tables or a scenario")
+    try:
+        found = RatingsFile.model_validate({"rating": document.get("rating", {})})
+    except ValidationError as error:
+        _complain_first(path, error)
+    return {joint: Rating(**section.model_dump()) for joint, section in found.rating.items()}
+
+
+def _read_toml(path: str | os.PathLike[str], data: bytes) -> tuple[str, dict[str, Any]]:
     try:
         text = data.decode("utf-8")
         if _LONG_KEY.search(text):
@@ -117,13 +219,7 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
         # ValueError: Python refuses integers of thousands of digits.
         problem = f"cannot be read ({shorten(error, 120)})"
         complain(path, "scenario", problem, "use shorter keys and numbers, nested less deeply")
-    if isinstance(document.get("model"), str):
-        document["model"] = {"path": document["model"]}
-    try:
-        settings = ScenarioFile.model_validate(document)
-    except ValidationError as error:
-        _complain_first(path, error)
-    return Scenario(Path(path), settings, text)
+    return text, document
 
 
 def _complain_first(path: str | os.PathLike[str], error: ValidationError) -> NoReturn:

@@ -126,6 +126,19 @@ class TorqueSection(_Tabled):
         return self
 
 
+class MotionSection(_Tabled):
+    """A motion from a table of positions, followed exactly."""
+
+    kind: Literal["motion"]
+    table: str
+    interpolation: Literal["cubic"] = "cubic"
+
+    @model_validator(mode="after")
+    def _one(self) -> MotionSection:
+        self._check_table("table", False)
+        return self
+
+
 class PDSection(_Tabled):
     """A PD controller to a fixed or tabulated target."""
 
@@ -162,11 +175,12 @@ class FreeSection(Section):
 
 
 DriveSection = Annotated[
-    TorqueSection | PDSection | SpringSection | LockedSection | FreeSection,
+    TorqueSection | MotionSection | PDSection | SpringSection | LockedSection | FreeSection,
     Field(discriminator="kind"),
 ]
 DRIVES: dict[str, type[Section]] = {
     "torque": TorqueSection,
+    "motion": MotionSection,
     "pd": PDSection,
     "spring": SpringSection,
     "locked": LockedSection,
@@ -192,6 +206,50 @@ class WrenchSection(_Tabled):
             for quantity in getattr(self, name) or ():
                 check_dimension(quantity.dimension, dimension)
         return self
+
+
+Mass = Annotated[Number, Field(ge=0)]
+Point = Annotated[list[Annotated[float, _of("length")]], Field(min_length=3, max_length=3)]
+Inertia = Annotated[list[Number], Field(min_length=3, max_length=6)]
+
+
+class LinkSection(Section):
+    """Other inertial data of a link; what is not given stays as in the model."""
+
+    mass: Mass | None = None
+    com: Point | None = None
+    inertia: Inertia | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> LinkSection:
+        if self.inertia is not None and len(self.inertia) not in (3, 6):
+            raise ValueError(
+                f"inertia has {len(self.inertia)} numbers; give ixx iyy izz, or also ixy ixz iyz"
+            )
+        return self
+
+
+class PayloadSection(LinkSection):
+    """A body welded to a link; centre of mass and inertia about it in the link's frame."""
+
+    link: str
+    mass: Mass
+
+
+Force = Annotated[float, _of("force"), Field(gt=0)]
+Moment = Annotated[float, _of("moment"), Field(gt=0)]
+
+
+class RatingSection(Section):
+    """What a joint may carry."""
+
+    force: Force | None = None
+    axial: Force | None = None
+    radial: Force | None = None
+    moment: Moment | None = None
+    tilting_moment: Moment | None = None
+    torque: Moment | None = None
+    drive_power: Annotated[Number, Field(gt=0)] | None = None
 
 
 class SimulateSection(Section):
@@ -233,8 +291,17 @@ class ScenarioFile(Section):
     initial: InitialSection = InitialSection()
     drive: dict[str, DriveSection] = {}
     wrench: dict[str, WrenchSection] = {}
+    payload: dict[str, PayloadSection] = {}
+    link: dict[str, LinkSection] = {}
+    rating: dict[str, RatingSection] = {}
     simulate: SimulateSection
     output: OutputSection = OutputSection()
+
+
+class RatingsFile(Section):
+    """The ratings of a file."""
+
+    rating: dict[str, RatingSection] = {}
 
 
 _SECTIONS: dict[str, type[Section]] = {
@@ -245,13 +312,22 @@ _SECTIONS: dict[str, type[Section]] = {
 }
 
 
+# Sections that hold a table a name.
+_NAMED: dict[str, type[Section]] = {
+    "wrench": WrenchSection,
+    "payload": PayloadSection,
+    "link": LinkSection,
+    "rating": RatingSection,
+}
+
+
 def keys_at(location: tuple[str | int, ...]) -> list[str]:
     """The keys that the table at ``location`` may have, for complaints about unknown ones."""
     section: type[Section] = ScenarioFile
     if location[:1] == ("drive",) and len(location) > 2:
         section = DRIVES[cast(str, location[2])]
-    elif location[:1] == ("wrench",) and len(location) > 1:
-        section = WrenchSection
+    elif location[:1] and location[0] in _NAMED and len(location) > 1:
+        section = _NAMED[str(location[0])]
     elif location:
         section = _SECTIONS.get(str(location[0]), ScenarioFile)
     return list(section.model_fields)

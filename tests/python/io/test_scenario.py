@@ -230,13 +230,34 @@ UNITS = "known units: rad, deg, rev, m, cm, mm, km, s, ms, min, h, "
             ": output.quantities: unknown quantity 'joint_lod'; did you mean 'joint_load'?",
         ),
         (
+            "\n[drive.shoulder]\nkind = 'movement'",
+            ": drive.shoulder.kind: 'movement' is not a kind of drive; "
+            "use one of torque, motion, pd, spring, locked, free",
+        ),
+        (
             "\n[drive.shoulder]\nkind = 'motion'",
-            ": drive.shoulder.kind: 'motion' is not a kind of drive; "
-            "use one of torque, pd, spring, locked, free",
+            ": drive.shoulder.table: is missing; add table = ...",
+        ),
+        (
+            "\n[payload.box]\nlink = 'hnd'\nmass = 1",
+            ": payload.box.link: the model has no link 'hnd'; the links are: base, upper, lower",
+        ),
+        (
+            "\n[payload.box]\nlink = 'hand'\nmass = -1",
+            ": payload.box.mass: is -1; give a number at least 0",
+        ),
+        (
+            "\n[rating.slid]\nforce = 1",
+            ": rating.slid: the model has no joint 'slid'; did you mean 'slide'?",
+        ),
+        (
+            "\n[rating.slide]\nforce = '3 N m'",
+            ": rating.slide.force: has a unit of moment where a force belongs; use one of N, kN",
         ),
         (
             "\n[drive.shoulder]\nvalue = 1",
-            ": drive.shoulder: has no kind; add kind = one of torque, pd, spring, locked, free",
+            ": drive.shoulder: has no kind; "
+            "add kind = one of torque, motion, pd, spring, locked, free",
         ),
         (
             "\n[drive.shoulder]\nkind = 'torque'",

@@ -118,7 +118,15 @@ def test_quantities_select_variables():
     names = {v.name for v in build_schema(model, ["energy", "position"]).variables}
     assert names == {"position", "kinetic_energy", "potential_energy"}
     assert build_schema(model, "joint_load").quantities == ("joint_load",)
-    assert build_schema(model).quantities == QUANTITIES
+    assert build_schema(model, wrenched=["a_link"]).quantities == QUANTITIES
+
+
+def test_wrenches_are_recorded_of_wrenched_bodies_alone():
+    model = build(("a", "revolute"), ("b", "revolute"))
+    assert "external_wrench" not in build_schema(model).quantities
+    made = build_schema(model, ["external_wrench"], wrenched=[model.body_names[1]])
+    assert variable(made, "external_wrench").shape == (1, 6)
+    assert made.coordinates["wrenched_body"].values.tolist() == [model.body_names[1]]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,314 @@
+"""`linkwise loads`: what the joints of a run carry: table, CSV, JSON, report."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from linkwise.cli.output import JsonOption, console, number, print_json, table, text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from linkwise._core import Model
+    from linkwise.loads.rating import Rating
+    from linkwise.result import Run
+
+_MOST_JOINTS = 40
+_SHOWN = ("force", "axial", "radial", "moment", "tilting_moment", "torque", "drive_power")
+
+
+def loads(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run that linkwise wrote (a folder).")],
+    joint: Annotated[
+        list[str] | None,
+        typer.Option("--joint", "-j", help="Only this joint, in full; may be repeated."),
+    ] = None,
+    split: Annotated[
+        str | None,
+        typer.Option(
+            "--split",
+            metavar="force|motion",
+            help="What each cause adds at the peaks: the acting forces, or what the motion needs.",
+        ),
+    ] = None,
+    ratings: Annotated[
+        Path | None,
+        typer.Option(
+            help="TOML file with [rating.JOINT] tables; those of the run's scenario by default."
+        ),
+    ] = None,
+    certify: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="SCENARIO|RUN",
+            help="Bounds the integration error: the run's scenario, to be simulated again 100 "
+            "times tighter, or a run made that way.",
+        ),
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(help="Also write the table as a CSV file.")] = None,
+    html: Annotated[
+        Path | None, typer.Option(help="Also write an interactive report, one file, for offline.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option(help="Model file, for runs that do not hold their model.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Peak loads of every joint of a RUN: with bounds, by cause, against ratings."""
+    from linkwise.io.load import load
+    from linkwise.loads.samples import joint_position
+    from linkwise.record.read import open_run
+
+    opened = open_run(run)
+    for name in joint or ():
+        joint_position(opened, name)
+    machine = load(model) if model is not None else opened.load_model()
+    found = collect(opened, machine, rating_tables(opened, ratings), certify, as_json)
+    shares = peak_shares(opened, machine, found["summary"], split) if split else []
+    records = peak_records(found, joint)
+    if csv is not None:
+        write_csv(records, csv)
+    if html is not None:
+        from linkwise.loads.html import write_report
+
+        write_report(opened, html, found, machine)
+    if as_json:
+        print_json({"run": str(run), "peaks": records, "split": shares})
+        return
+    screen = console()
+    for made in tables(records, shares, joint):
+        screen.print(made)
+    for path in (csv, html):
+        if path is not None:
+            screen.print(f"Written: {path}", markup=False)
+
+
+def rating_tables(run: Run, path: Path | None) -> dict[str, Rating]:
+    """Ratings of the file, or of the scenario that the run keeps."""
+    from linkwise.scenario import load_ratings, ratings_in
+
+    if path is not None:
+        return load_ratings(path)
+    return ratings_in(str(run.dataset.attrs.get("scenario", "")))
+
+
+def tighter_run(run: Run, path: Path, quiet: bool) -> Run:
+    """The run at `path`, or the scenario there simulated again at a tighter tolerance."""
+    import json
+
+    from linkwise._core import InputError
+    from linkwise.cli.progress import live_progress
+    from linkwise.loads.certainty import TIGHTER
+    from linkwise.record.read import open_run
+    from linkwise.scenario import load_scenario
+    from linkwise.simulation import simulate
+
+    if path.is_dir():
+        return open_run(path)
+    scenario = load_scenario(path)
+    if scenario.text != run.dataset.attrs.get("scenario"):
+        raise InputError(
+            f"{str(path)!r}: is not the scenario that made the run; give that one, or a tighter run"
+        )
+    machine = scenario.load_model()
+    arguments = scenario.simulate_arguments(machine)
+    used = json.loads(run.dataset.attrs["options"])
+    arguments |= {
+        "tolerance": used["tolerance"] / TIGHTER,
+        "times": run.dataset["time"].values,
+        "every": None,
+        "duration": None,
+        "output": None,
+    }
+    with live_progress(quiet=quiet) as progress:
+        return simulate(machine, **arguments, progress=progress)
+
+
+def collect(
+    run: Run, model: Model, ratings: dict[str, Rating], certify: Path | None, quiet: bool
+) -> dict[str, Any]:
+    """Summary, bounds (where the run holds enough) and margins (where there are ratings)."""
+    from linkwise._core import InputError
+    from linkwise.loads import bounds, margins, summary
+
+    peaks = summary(run, model)
+    tighter = None if certify is None else tighter_run(run, certify, quiet)
+    limits: xr.Dataset | None = None
+    try:
+        limits = bounds(run, tighter, model)
+    except InputError:
+        if certify is not None:
+            raise
+    plus_minus = None if tighter is None or limits is None else limits["plus_minus"]
+    left = margins(peaks, ratings, plus_minus) if ratings else None
+    return {"summary": peaks, "bounds": limits, "margins": left}
+
+
+def peak_records(found: dict[str, Any], joints: list[str] | None) -> list[dict[str, Any]]:
+    """One record a joint and quantity."""
+    summary: xr.Dataset = found["summary"]
+    components = [str(c) for c in summary["component"].values]
+    units = [str(u) for u in summary["quantity_units"].values]
+    first, last = ("peak", "peak_time"), ("sampling", "rms", "mean", "minimum", "maximum", "duty")
+    columns = {key: summary[key].values for key in first}
+    for other, keys in (
+        ("bounds", ("algebraic", "integration", "plus_minus")),
+        ("margins", ("rating", "use", "margin")),
+    ):
+        if found[other] is not None:
+            columns |= {key: found[other][key].values for key in keys}
+    columns |= {key: summary[key].values for key in last}
+    columns |= {name: summary["wrench"].values[..., c] for c, name in enumerate(components)}
+    records = []
+    for j, name in enumerate(summary["joint"].values.tolist()):
+        if joints and name not in joints:
+            continue
+        for k, quantity in enumerate(summary["quantity"].values.tolist()):
+            if math.isnan(columns["peak"][k, j]):  # no single axis
+                continue
+            record: dict[str, Any] = {"joint": name, "quantity": quantity, "unit": units[k]}
+            records.append(record | {key: float(values[k, j]) for key, values in columns.items()})
+    return records
+
+
+def write_csv(records: list[dict[str, Any]], path: Path) -> None:
+    import csv
+
+    from linkwise._core import InputError
+
+    if not records:
+        raise InputError(f"{str(path)!r}: there is nothing to write")
+    try:
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, records[0], lineterminator="\n")
+            writer.writeheader()
+            for record in records:
+                writer.writerow({k: "" if v != v else v for k, v in record.items()})
+    except OSError as error:
+        raise InputError(f"{str(path)!r}: cannot write it ({error.strerror})") from None
+
+
+def peak_shares(run: Run, model: Model, summary: xr.Dataset, by: str) -> list[dict[str, Any]]:
+    """What each cause adds to the peak force and moment, along them; the shares add up."""
+    import numpy as np
+
+    from linkwise._core import InputError
+    from linkwise.loads.causes import CAUSES, Split
+    from linkwise.plots import along_total
+
+    if by not in CAUSES:
+        raise InputError(f"--split: {by!r} is unknown; use force or motion")
+    made = Split(run, by, model)  # type: ignore[arg-type]
+    times = run.dataset["time"].values
+    names = [str(name) for name in summary["joint"].values]
+    records = []
+    for half, quantity, unit in ((0, "force", "N"), (3, "moment", "N m")):
+        when = summary["peak_time"].sel(quantity=quantity).values
+        for j, name in enumerate(names):
+            k = int(np.searchsorted(times, when[j]))
+            shares = made.shares(slice(k, k + 1))[:, :, j, half : half + 3]
+            parts, size = along_total(shares)
+            records.append(
+                {
+                    "joint": name,
+                    "quantity": quantity,
+                    "unit": unit,
+                    "time": float(times[k]),
+                    "peak": float(size[0]),
+                    **dict(zip(made.names, parts[0].tolist(), strict=True)),
+                }
+            )
+    return records
+
+
+def _with_bound(record: dict[str, Any]) -> str:
+    shown = number(record["peak"])
+    if math.isfinite(record.get("plus_minus", math.nan)):
+        shown += f" ± {number(record['plus_minus'], 1)}"
+    return shown
+
+
+def tables(
+    records: list[dict[str, Any]], shares: list[dict[str, Any]], joints: list[str] | None
+) -> list[Any]:
+    made = [_joint_table(records, name) for name in joints] if joints else [_all_joints(records)]
+    rated = [record for record in records if record.get("rating", 0) > 0]
+    if rated:
+        made.append(_margin_table(rated))
+    chosen = [s for s in shares if not joints or s["joint"] in joints]
+    if chosen:
+        made.append(_share_table(chosen))
+    return made
+
+
+def _all_joints(records: list[dict[str, Any]]) -> Any:
+    by_joint: dict[str, dict[str, dict[str, Any]]] = {}
+    for record in records:
+        by_joint.setdefault(record["joint"], {})[record["quantity"]] = record
+    rows = list(by_joint.items())
+    title = "Peak joint loads, inboard on outboard body, in the joint frame at the joint point"
+    if len(rows) > _MOST_JOINTS:
+        rows = sorted(rows, key=lambda item: -item[1]["force"]["peak"])[:_MOST_JOINTS]
+        title += f" (the {_MOST_JOINTS} largest forces of {len(by_joint)} joints)"
+    shown = [name for name in _SHOWN if any(name in found for _, found in rows)]
+    units = {r["quantity"]: r["unit"] for r in records}
+    headings = [(f"{name.replace('_', ' ')} [{units[name]}]", "right") for name in shown]
+    result = table(title, [("joint", "left"), ("at [s]", "right"), *headings])
+    for name, found in rows:
+        when = number(found["force"]["peak_time"])
+        cells = [_with_bound(found[q]) if q in found else "" for q in shown]
+        result.add_row(text(name), when, *cells)
+    return result
+
+
+def _joint_table(records: list[dict[str, Any]], joint: str) -> Any:
+    components = ("fx", "fy", "fz", "nx", "ny", "nz")
+    headings = ["peak", "at [s]", "rms", "minimum", "maximum", "duty", *components]
+    columns = [("quantity", "left"), *((name, "right") for name in headings)]
+    result = table(f"Load of {text(joint)}; fx ... nz at the time of each peak", columns)
+    for record in records:
+        if record["joint"] != joint:
+            continue
+        keys = ("peak_time", "rms", "minimum", "maximum", "duty", *components)
+        result.add_row(
+            f"{record['quantity'].replace('_', ' ')} [{record['unit']}]",
+            _with_bound(record),
+            *(number(record[key]) for key in keys),
+        )
+    return result
+
+
+def _margin_table(rated: list[dict[str, Any]]) -> Any:
+    headings = [("joint", "left"), ("quantity", "left")]
+    headings += [(name, "right") for name in ("peak", "rating", "use", "margin")]
+    result = table("Against the ratings; the bounds of certified peaks count as load", headings)
+    for record in sorted(rated, key=lambda r: -r["use"]):
+        style = "red" if record["margin"] < 0 else ""
+        result.add_row(
+            text(record["joint"]),
+            f"{record['quantity'].replace('_', ' ')} [{record['unit']}]",
+            _with_bound(record),
+            number(record["rating"]),
+            f"{100 * record['use']:.1f} %",
+            f"{100 * record['margin']:.1f} %",
+            style=style,
+        )
+    return result
+
+
+def _share_table(shares: list[dict[str, Any]]) -> Any:
+    fixed = ("joint", "quantity", "unit", "time", "peak")
+    causes = [key for key in shares[0] if key not in fixed]
+    headings = [("joint", "left"), ("of the peak", "left"), ("at [s]", "right"), ("peak", "right")]
+    result = table(
+        "By cause, along the peak force or moment; the shares add up to it",
+        [*headings, *((name, "right") for name in causes)],
+    )
+    for record in shares:
+        cells = [number(record[name]) for name in ("time", "peak", *causes)]
+        result.add_row(text(record["joint"]), f"{record['quantity']} [{record['unit']}]", *cells)
+    return result

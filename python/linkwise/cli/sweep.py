@@ -1,0 +1,103 @@
+"""`linkwise sweep`: one scenario with many values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from linkwise.cli.output import FAILED, JsonOption, console, number, print_json, table, text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def sweep(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (TOML).")],
+    axis: Annotated[
+        list[str],
+        typer.Option(
+            "--set",
+            "-s",
+            metavar="KEY=[VALUES]",
+            help="A key of the scenario and its values, in TOML; may be repeated, all combinations "
+            "are run. Example: payload.box.mass=[0, 5, 10]",
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Where to write all runs (a NetCDF file)."),
+    ] = None,
+    processes: Annotated[
+        int | None, typer.Option(help="How many run side by side; one a processor by default.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Simulate a SCENARIO with every combination of values, side by side."""
+    from linkwise._core import InputError
+    from linkwise.record.export import write_netcdf
+    from linkwise.scenario import parse_axis
+    from linkwise.sweeping import sweep as run_sweep
+
+    axes = {}
+    for key, values in map(parse_axis, axis):
+        if key in axes:
+            raise InputError(f"--set {key}: is given twice; put all values into one list")
+        axes[key] = values
+    if output is not None and not output.parent.is_dir():
+        raise InputError(f"{str(output)!r}: folder {str(output.parent)!r} does not exist")
+    found = run_sweep(scenario, axes, processes=processes)
+    if output is not None:
+        write_netcdf(found, output)
+    records = member_records(found, list(axes))
+    if as_json:
+        print_json({"output": None if output is None else str(output), "members": records})
+    else:
+        screen = console()
+        screen.print(_member_table(records, list(axes)))
+        if output is not None:
+            screen.print(f"Written: {output}", markup=False)
+    if any(record["outcome"] != "converged" for record in records):
+        raise typer.Exit(FAILED)
+
+
+def member_records(found: xr.Dataset, keys: list[str]) -> list[dict[str, Any]]:
+    """Per member its values, how it went, and the largest force and moment and where."""
+    import numpy as np
+
+    records = []
+    for k in range(found.sizes["member"]):
+        member = found.isel(member=k)
+        record: dict[str, Any] = {key: member[key].values.tolist() for key in keys}
+        record["outcome"] = str(member["outcome"].values)
+        for half, components in (("force", ["fx", "fy", "fz"]), ("moment", ["nx", "ny", "nz"])):
+            if "joint_load" not in found:
+                continue
+            load = member["joint_load"].sel(component=components)
+            size = np.linalg.norm(load.transpose("time", "joint", "component").values, axis=-1)
+            at = np.unravel_index(int(np.nanargmax(size)), size.shape)
+            record |= {
+                f"largest_{half}": float(size[at]),
+                f"{half}_joint": str(found["joint"].values[at[1]]),
+            }
+        records.append(record)
+    return records
+
+
+def _member_table(records: list[dict[str, Any]], keys: list[str]) -> Any:
+    columns = [(text(key), "right") for key in keys]
+    columns += [("outcome", "left"), ("force [N]", "right"), ("joint", "left")]
+    columns += [("moment [N m]", "right"), ("joint", "left")]
+    made = table("Largest joint loads of each member", columns)
+    for record in records:
+        values = [v if isinstance(v, str) else number(v) for v in (record[key] for key in keys)]
+        made.add_row(
+            *(text(v) for v in values),
+            record["outcome"],
+            number(record.get("largest_force", float("nan"))),
+            text(record.get("force_joint", "")),
+            number(record.get("largest_moment", float("nan"))),
+            text(record.get("moment_joint", "")),
+        )
+    return made

@@ -1,0 +1,31 @@
+"""What a designer reads off a run: loads in any frame, by cause, with bounds, ratings, reports.
+
+Everything takes a `Run` and returns xarray objects whose attributes state units, frames and signs.
+The run must hold `joint_load`; what else a function needs is in its docstring.
+"""
+
+from linkwise.loads.causes import split
+from linkwise.loads.certainty import bounds
+from linkwise.loads.energy import energy_balance
+from linkwise.loads.engineering import QUANTITIES, quantities
+from linkwise.loads.fatigue import cycles, damage_equivalent, load_duration, spectrum
+from linkwise.loads.frames import in_frame
+from linkwise.loads.peaks import envelope, summary
+from linkwise.loads.rating import Rating, margins
+
+__all__ = [
+    "QUANTITIES",
+    "Rating",
+    "bounds",
+    "cycles",
+    "damage_equivalent",
+    "energy_balance",
+    "envelope",
+    "in_frame",
+    "load_duration",
+    "margins",
+    "quantities",
+    "spectrum",
+    "split",
+    "summary",
+]

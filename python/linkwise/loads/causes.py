@@ -1,0 +1,164 @@
+"""Joint loads split by cause: the shares add up to the load."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from linkwise import _core
+from linkwise._core import InputError
+from linkwise.loads.samples import (
+    Array,
+    external,
+    given_motions,
+    joint_names,
+    model_of,
+    need_whole,
+    rows,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from linkwise._core import Model
+    from linkwise.result import Run
+
+By = Literal["force", "motion"]
+
+CAUSES: dict[str, dict[str, str]] = {
+    "force": {
+        "gravity": "gravity acting alone on the mechanism at rest",
+        "velocity": "centrifugal, Coriolis and gyroscopic terms of the joints' rates alone",
+        "drive": "the drive torques alone",
+        "motion": "the accelerations of the joints whose motion is given, alone",
+        "passive": "damping, friction, springs and stops of the joints alone",
+        "external": "the external wrenches alone",
+    },
+    "motion": {
+        "gravity": "what holds the mechanism at rest against gravity",
+        "velocity": "what the joints' rates need: centrifugal, Coriolis, gyroscopic",
+        "acceleration": "what the joints' accelerations need",
+        "external": "what balances the external wrenches",
+    },
+}
+
+
+_PASSIVE = ("damping", "friction", "stiffness", "limit_stiffness")
+
+
+class Split:
+    """Evaluates the shares of any block of samples of one run.
+
+    At a given position the constraint-force system A f = b is linear in b, and b in gravity, the
+    velocity terms, drives, external wrenches and passive forces; so is the recursion that solves
+    the same equations. Each cause alone gives its share.
+    """
+
+    def __init__(self, run: Run, by: By, model: Model | None) -> None:
+        if by not in CAUSES:
+            raise InputError(f'by: {by!r} is unknown; use "force" or "motion"')
+        self.run, self.by = run, by
+        machine = model_of(run, model)
+        wanted = ["joint_load", "position", "velocity"]
+        wanted += ["drive_torque"] if by == "force" else ["acceleration"]
+        self.given = given_motions(run)
+        if by == "force" and self.given:
+            wanted.append("acceleration")
+        need_whole(run, machine, *wanted)
+        self.model = machine
+        held = by == "force" and self.given
+        self.free = machine.prescribe(list(self.given)) if held else machine
+        self.imposed = np.zeros(machine.nv, dtype=bool)
+        for joint in self.given:
+            self.imposed[machine.v_slice(joint)] = True
+        self.names = [name for name in CAUSES[by] if self._happens(name)]
+
+    def _happens(self, cause: str) -> bool:
+        if cause == "passive":
+            return any(self.model.dof_property(name).any() for name in _PASSIVE)
+        if cause == "external":
+            return "external_wrench" in self.run.dataset
+        if cause == "motion":
+            return "motion" in self.given.values()
+        return True
+
+    def shares(self, where: slice) -> Array:
+        """(time, cause, joint, 6) of these samples."""
+        q = rows(self.run, "position", where)
+        v = rows(self.run, "velocity", where)
+        outside = external(self.run, self.model, where)
+        make = self._of_force if self.by == "force" else self._of_motion
+        return np.stack([make(name, q, v, outside, where) for name in self.names], axis=1)
+
+    def _of_force(
+        self, cause: str, q: Array, v: Array, outside: Array | None, where: slice
+    ) -> Array:
+        options: dict[str, Any] = {"gravity": 1.0 if cause == "gravity" else 0.0}
+        rates = v if cause == "velocity" else None
+        torque = None
+        if cause == "drive":
+            torque = np.where(self.imposed, 0.0, rows(self.run, "drive_torque", where))
+        elif cause == "passive":
+            torque = _core.passive_torque(self.model, q, v)
+        elif cause == "motion":
+            options["prescribed"] = rows(self.run, "acceleration", where)
+        elif cause == "external":
+            options["external"] = outside
+        found = _core.forward_dynamics(self.free, q, rates, torque, full=True, **options)
+        if found.report.outcome != "converged":
+            raise _core.NumericsError(f"split: {found.report.outcome} at {found.report.body}")
+        return np.asarray(found.joint_load)
+
+    def _of_motion(
+        self, cause: str, q: Array, v: Array, outside: Array | None, where: slice
+    ) -> Array:
+        rates = v if cause == "velocity" else None
+        acceleration = None
+        if cause == "acceleration":
+            acceleration = rows(self.run, "acceleration", where)
+        return np.asarray(
+            _core.inverse_dynamics_loads(
+                self.model,
+                q,
+                rates,
+                acceleration,
+                external=outside if cause == "external" else None,
+                gravity=1.0 if cause == "gravity" else 0.0,
+            )
+        )
+
+
+def split(run: Run, by: By = "force", model: Model | None = None) -> xr.DataArray:
+    """Joint loads by cause; the shares add up to the joint load to rounding.
+
+    Args:
+        run: Holds `joint_load`, `position`, `velocity` and `drive_torque` of all joints, and
+            `external_wrench` where there are wrenches; by motion `acceleration` instead of
+            `drive_torque`.
+        by: "force": what each acting force alone would load the joints with while the mechanism
+            moves freely under it (joints whose motion is given stay held). "motion": what the
+            position, the rates and the accelerations of this very motion each need.
+        model: The machine, where the run does not hold it.
+
+    Returns:
+        DataArray (time, cause, joint, component), frame and signs as `joint_load`. Causes that the
+        run cannot have are left out.
+    """
+    import xarray as xr
+
+    made = Split(run, by, model)
+    given = run.dataset["joint_load"]
+    about = {f"cause {name}": CAUSES[by][name] for name in made.names}
+    return xr.DataArray(
+        made.shares(slice(None)),
+        dims=("time", "cause", "joint", "component"),
+        coords={
+            "time": run.dataset["time"],
+            "cause": made.names,
+            "joint": ("joint", joint_names(run)),
+            "component": given["component"],
+        },
+        attrs={**given.attrs, "long_name": f"joint load by {by}", **about},
+        name="joint_load",
+    )

@@ -1,0 +1,178 @@
+"""Error bounds of joint loads: of the linear algebra, of the integration, of the sampling.
+
+Algebraic: the recorded accelerations a leave a residual r = tau - ID(q, v, a) in the equations of
+motion. One step of refinement, a' = a + H^-1 r with the factorisation of the recursion, gives the
+loads that a should have had; their distance from the recorded ones is the error of the solver, be
+it rounding or an iteration that stopped early.
+
+Integration: the same run at a tighter tolerance. Its own error is smaller by about the ratio of the
+tolerances, so that the distance of the two runs is the error of the first.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from linkwise import _core
+from linkwise._core import InputError
+from linkwise.loads.engineering import derive, derived_rows, joint_directions
+from linkwise.loads.peaks import summary
+from linkwise.loads.samples import (
+    Array,
+    blocks,
+    external,
+    given_motions,
+    joint_names,
+    model_of,
+    need_whole,
+    rows,
+    select,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from linkwise._core import Model
+    from linkwise.result import Run
+
+# How many times tighter `--certify` simulates again.
+TIGHTER = 100.0
+# The distance of two runs understates the error where both err alike: what is stated is twice it.
+SAFETY = 2.0
+# Rounding of the wrench recursion, relative to the largest load of the sample.
+_ROUNDING = 64 * np.finfo(np.float64).eps
+
+
+def refined_loads(run: Run, model: Model, where: slice) -> Array:
+    """Joint loads (time, joint, 6) after one step of refinement of the recorded accelerations."""
+    q, v = rows(run, "position", where), rows(run, "velocity", where)
+    a = rows(run, "acceleration", where)
+    outside = external(run, model, where)
+    torque = rows(run, "drive_torque", where) + _core.passive_torque(model, q, v)
+    residual = torque - _core.inverse_dynamics(model, q, v, a, external=outside)
+    loads = _core.inverse_dynamics_loads(model, q, v, a, external=outside)
+    given = list(given_motions(run))
+    free = model.prescribe(given) if given else model
+    for joint in given:
+        residual[:, model.v_slice(joint)] = 0.0
+    step = _core.forward_dynamics(free, q, None, residual, gravity=0.0, full=True)
+    return np.asarray(loads + step.joint_load)
+
+
+def _algebraic(run: Run, model: Model, names: list[str]) -> Array:
+    """Largest algebraic error over time (quantity, joint)."""
+    directions = joint_directions(model)
+    worst = np.zeros((len(names), model.n_joints))
+    for where in blocks(run, 8 * 40 * model.n_joints):
+        recorded = rows(run, "joint_load", where)
+        refined = refined_loads(run, model, where)
+        first, second = derive(recorded, directions), derive(refined, directions)
+        scale = {
+            "force": np.linalg.norm(recorded[..., :3], axis=-1).max(axis=1),
+            "moment": np.linalg.norm(recorded[..., 3:], axis=-1).max(axis=1),
+        }
+        for k, name in enumerate(names):
+            if name not in first:  # power: the drives' torques are given
+                continue
+            of = "force" if name in ("force", "axial", "radial") else "moment"
+            floor = _ROUNDING * scale[of][:, None]
+            worst[k] = np.fmax(worst[k], (np.abs(first[name] - second[name]) + floor).max(axis=0))
+    return worst
+
+
+def _tolerance(run: Run) -> float:
+    options = json.loads(run.dataset.attrs.get("options", "{}"))
+    return float(options.get("tolerance", np.nan))
+
+
+def _check_tighter(run: Run, tighter: Run) -> None:
+    same = np.array_equal(run.dataset["time"].values, tighter.dataset["time"].values)
+    if not same or joint_names(run) != joint_names(tighter):
+        raise InputError(
+            "the tighter run has other samples or joints; simulate it with the same ones"
+        )
+    for key in ("model", "model_joints", "drives", "wrenches"):
+        if run.dataset.attrs.get(key) != tighter.dataset.attrs.get(key):
+            raise InputError(f"the tighter run has another {key}; simulate the same machine alike")
+    loose, tight = _tolerance(run), _tolerance(tighter)
+    if not tight <= loose / 10:
+        raise InputError(
+            f"the tighter run has tolerance {tight:g}, the run {loose:g}; "
+            f"simulate it with {loose / TIGHTER:g}"
+        )
+
+
+def _integration(run: Run, tighter: Run, model: Model, names: list[str], until: Array) -> Array:
+    """Error bound (quantity, joint) of the peaks: the largest distance of the two runs until both
+    have had theirs."""
+    found = select(run, model)
+    directions = joint_directions(model)[found.joints]
+    times = run.dataset["time"].values
+    at = np.searchsorted(times, np.nan_to_num(until))
+    largest = np.zeros(until.shape)
+    bound = np.zeros(until.shape)
+    for where in blocks(run, 8 * 40 * found.joints.size):
+        first = derived_rows(run, found, directions, where)
+        second = derived_rows(tighter, found, directions, where)
+        for k, name in enumerate(names):
+            distance = np.abs(first[name] - second[name])
+            running = np.maximum.accumulate(np.vstack([largest[k], distance]), axis=0)[1:]
+            here = np.flatnonzero((at[k] >= where.start) & (at[k] < where.stop))
+            bound[k, here] = running[at[k, here] - where.start, here]
+            largest[k] = running[-1]
+    return SAFETY * bound
+
+
+def bounds(run: Run, tighter: Run | None = None, model: Model | None = None) -> xr.Dataset:
+    """How far each peak of `summary` may be from the truth.
+
+    Args:
+        run: Holds `joint_load`, `position`, `velocity`, `acceleration`, `drive_torque` of all
+            joints, and `external_wrench` where there are wrenches.
+        tighter: The same simulation at a tolerance at least ten times tighter, with the same
+            samples; without it the error of the integration is not known.
+        model: The machine, where the run does not hold it.
+
+    Returns:
+        Dataset over (quantity, joint), in the quantities' units: `algebraic`, `integration` and
+        `plus_minus`, their sum; the last two are NaN without `tighter`. Errors of the model, of
+        its data and of peaks between samples (`sampling` of `summary`) are not in it.
+    """
+    import xarray as xr
+
+    machine = model_of(run, model)
+    wanted = ("joint_load", "position", "velocity", "acceleration", "drive_torque")
+    need_whole(run, machine, *wanted)
+    peaks = summary(run, machine)
+    names = [str(name) for name in peaks["quantity"].values]
+    absent = np.isnan(peaks["peak"].values)
+    algebraic = np.where(absent, np.nan, _algebraic(run, machine, names))
+    integration = np.full_like(algebraic, np.nan)
+    if tighter is not None:
+        _check_tighter(run, tighter)
+        later = summary(tighter, machine)["peak_time"].values
+        until = np.fmax(peaks["peak_time"].values, later)
+        integration = _integration(run, tighter, machine, names, until)
+        integration[absent] = np.nan
+    data = {
+        "algebraic": (algebraic, "error of the linear algebra, by one step of refinement"),
+        "integration": (
+            integration,
+            f"error of the integration: {SAFETY:g} times the distance to the tighter run",
+        ),
+        "plus_minus": (
+            algebraic + integration,
+            "algebraic and integration error of the peak; not known without a tighter run",
+        ),
+    }
+    units = "of the quantity, see quantity_units"
+    return xr.Dataset(
+        {
+            name: (("quantity", "joint"), values, {"long_name": text, "units": units})
+            for name, (values, text) in data.items()
+        },
+        coords={name: peaks[name] for name in ("quantity", "quantity_units", "joint")},
+    )

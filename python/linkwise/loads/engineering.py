@@ -1,0 +1,153 @@
+"""Engineering quantities of joint loads: axial, radial, tilting moment, torque, drive power."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from linkwise.loads.samples import Array, Selection, joint_names, model_of, need, rows, select
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from linkwise._core import Model
+    from linkwise.result import Run
+
+
+class Quantity(NamedTuple):
+    long_name: str
+    units: str
+    convention: str
+
+
+_AXIS = "the joint's axis through the joint point; none for joints of several directions"
+QUANTITIES: dict[str, Quantity] = {
+    "force": Quantity("joint force", "N", "length of the force (fx, fy, fz)"),
+    "axial": Quantity(
+        "axial force",
+        "N",
+        f"force along {_AXIS}; positive: the inboard body pushes the outboard body along +axis",
+    ),
+    "radial": Quantity(
+        "radial force", "N", f"length of the part of the force across {_AXIS}; never negative"
+    ),
+    "moment": Quantity(
+        "joint moment", "N m", "length of the moment (nx, ny, nz) about the joint point"
+    ),
+    "tilting_moment": Quantity(
+        "tilting moment",
+        "N m",
+        f"length of the part of the moment about the joint point across {_AXIS}; never negative",
+    ),
+    "torque": Quantity(
+        "torque about the axis",
+        "N m",
+        f"moment about {_AXIS}; positive: the inboard body turns the outboard body about +axis; "
+        "drive, damping, friction, spring and stop together",
+    ),
+    "drive_power": Quantity(
+        "drive power", "W", "drive torque times joint rate; positive: into the mechanism"
+    ),
+}
+
+
+def joint_directions(model: Model) -> Array:
+    """Direction of each joint's axis in its frame (joint, 3); NaN where it has no single one."""
+    found = np.full((model.n_joints, 3), np.nan)
+    for k, axes in enumerate(model.joint_axes):
+        directions = np.array([axis[1] for axis in axes], dtype=np.float64).reshape(-1, 3)
+        if len(directions) == 0:
+            continue
+        first = directions[0] / np.linalg.norm(directions[0])
+        across = np.linalg.norm(np.cross(first, directions), axis=1)
+        if np.all(across <= 1e-9 * np.linalg.norm(directions, axis=1)):
+            found[k] = first
+    return found
+
+
+def derive(load: Array, directions: Array) -> dict[str, Array]:
+    """Quantities (..., joint) of loads (..., joint, 6) for axes (joint, 3)."""
+    force, moment = load[..., :3], load[..., 3:]
+    axial = np.einsum("...ji,ji->...j", force, directions)
+    torque = np.einsum("...ji,ji->...j", moment, directions)
+    return {
+        "force": np.linalg.norm(force, axis=-1),
+        "axial": axial,
+        "radial": np.linalg.norm(force - axial[..., None] * directions, axis=-1),
+        "moment": np.linalg.norm(moment, axis=-1),
+        "tilting_moment": np.linalg.norm(moment - torque[..., None] * directions, axis=-1),
+        "torque": torque,
+    }
+
+
+def has_power(run: Run) -> bool:
+    return "drive_torque" in run.dataset and "velocity" in run.dataset
+
+
+def drive_power(run: Run, found: Selection, where: slice) -> Array:
+    """Power of each joint's drive (time, joint) [W]."""
+    each = rows(run, "drive_torque", where) * rows(run, "velocity", where)
+    power = np.zeros((len(each), found.joints.size))
+    np.add.at(power.T, found.owner, each.T)
+    return power
+
+
+def derived_rows(run: Run, found: Selection, directions: Array, where: slice) -> dict[str, Array]:
+    """All quantities of one block of samples, (time, joint) each."""
+    values = derive(rows(run, "joint_load", where), directions)
+    if has_power(run):
+        values["drive_power"] = drive_power(run, found, where)
+    return values
+
+
+def quantity_attrs(name: str) -> dict[str, str]:
+    about = QUANTITIES[name]
+    return {
+        "long_name": about.long_name,
+        "units": about.units,
+        "convention": about.convention,
+        "point": "joint point: the origin of the joint frame",
+        "of": "wrench that the inboard body exerts on the outboard body through the joint",
+    }
+
+
+def quantities(run: Run, model: Model | None = None) -> xr.Dataset:
+    """Engineering quantities over time and joint, each with its convention in `attrs`.
+
+    Args:
+        run: Holds `joint_load`; with `velocity` and `drive_torque` also drive power and energy.
+        model: The machine, where the run does not hold it.
+
+    Returns:
+        Dataset over (time, joint): `force`, `axial`, `radial`, `moment`, `tilting_moment`,
+        `torque`, `drive_power`, `drive_energy` [J] (the power's integral since the first sample,
+        by Simpson's rule). NaN where a joint has no single axis.
+    """
+    import xarray as xr
+    from scipy.integrate import cumulative_simpson
+
+    need(run, "joint_load")
+    machine = model_of(run, model)
+    found = select(run, machine)
+    directions = joint_directions(machine)[found.joints]
+    values = derived_rows(run, found, directions, slice(None))
+    coords = {"time": run.dataset["time"], "joint": ("joint", joint_names(run))}
+    data = {
+        name: (("time", "joint"), array, quantity_attrs(name)) for name, array in values.items()
+    }
+    if "drive_power" in values:
+        times = run.dataset["time"].values
+        power = values["drive_power"]
+        energy = (
+            cumulative_simpson(power, x=times, axis=0, initial=0)
+            if times.size > 2
+            else np.zeros_like(power)
+        )
+        attrs = {
+            "long_name": "drive energy",
+            "units": "J",
+            "convention": "integral of drive_power since the first sample, by Simpson's rule",
+        }
+        data["drive_energy"] = (("time", "joint"), energy, attrs)
+    return xr.Dataset(data, coords=coords)

@@ -1,0 +1,210 @@
+"""Load cycles and what they damage, load durations, spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from linkwise._core import InputError
+from linkwise.loads.engineering import QUANTITIES, derive, drive_power, has_power, joint_directions
+from linkwise.loads.samples import (
+    Array,
+    joint_names,
+    joint_position,
+    model_of,
+    need,
+    rows,
+    select,
+    trapezoid_weights,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from linkwise._core import Model
+    from linkwise.result import Run
+
+COMPONENTS = ("fx", "fy", "fz", "nx", "ny", "nz")
+# Slopes of Woehler lines: welded steel, steel, cast iron and composites.
+EXPONENTS = (3.0, 5.0, 10.0)
+
+
+def signal(run: Run, joint: str, quantity: str, model: Model | None = None) -> tuple[Array, str]:
+    """One quantity or component of one joint over time, and its unit."""
+    need(run, "joint_load")
+    k = joint_position(run, joint)
+    load = rows(run, "joint_load", slice(None))
+    if quantity in COMPONENTS:
+        c = COMPONENTS.index(quantity)
+        return load[:, k, c], "N" if c < 3 else "N m"
+    if quantity not in QUANTITIES:
+        known = ", ".join((*COMPONENTS, *QUANTITIES))
+        raise InputError(f"quantity: {quantity!r} is unknown; use {known}")
+    machine = model_of(run, model)
+    found = select(run, machine)
+    if quantity == "drive_power":
+        if not has_power(run):
+            raise InputError("run holds no drive power; record velocity and drive_torque")
+        values = drive_power(run, found, slice(None))[:, k]
+    else:
+        direction = joint_directions(machine)[found.joints][k : k + 1]
+        values = derive(load[:, k : k + 1], direction)[quantity][:, 0]
+    if np.isnan(values).any():
+        raise InputError(
+            f"joint {joint!r} has no single axis, so no {QUANTITIES[quantity].long_name}; "
+            "use force, moment or a component"
+        )
+    return values, QUANTITIES[quantity].units
+
+
+def _rainflow() -> object:
+    try:
+        import rainflow
+    except ModuleNotFoundError:
+        raise InputError(
+            "counting load cycles needs the package rainflow; pip install 'linkwise[report]'"
+        ) from None
+    return rainflow
+
+
+def _count(values: Array) -> Array:
+    """Rainflow cycles of a signal: rows of (range, mean, count), count 1 or 0.5 [astm1985]."""
+    counted = [cycle[:3] for cycle in _rainflow().extract_cycles(values)]  # type: ignore[attr-defined]
+    return np.array(counted, dtype=np.float64).reshape(-1, 3)
+
+
+def cycles(run: Run, joint: str, quantity: str, model: Model | None = None) -> xr.Dataset:
+    """Rainflow cycles of one quantity or component of one joint.
+
+    Returns:
+        Dataset over `cycle`: `range`, `mean` and `count` (1, or 0.5 for half cycles).
+    """
+    import xarray as xr
+
+    values, units = signal(run, joint, quantity, model)
+    counted = _count(values)
+    about = {"range": ("range of the cycle", units), "mean": ("mean of the cycle", units)}
+    about["count"] = ("whole or half cycle", "1")
+    data = {
+        name: ("cycle", counted[:, k], {"long_name": text, "units": unit})
+        for k, (name, (text, unit)) in enumerate(about.items())
+    }
+    return xr.Dataset(data, attrs={"joint": joint, "quantity": quantity, "method": "ASTM E1049"})
+
+
+def equivalent(ranges: Array, counts: Array, exponent: float, repetitions: float) -> float:
+    """Range that, `repetitions` times, damages as much as all cycles: (sum n S^m / N)^(1/m)."""
+    if ranges.size == 0:
+        return 0.0
+    largest = float(ranges.max())
+    if largest == 0:
+        return 0.0
+    scaled = float(np.sum(counts * (ranges / largest) ** exponent))
+    return float(largest * (scaled / repetitions) ** (1 / exponent))
+
+
+def damage_equivalent(
+    run: Run,
+    exponents: Sequence[float] = EXPONENTS,
+    repetitions: float | None = None,
+    joints: Sequence[str] | None = None,
+) -> xr.DataArray:
+    """Damage-equivalent ranges of every load component.
+
+    Args:
+        run: Holds `joint_load`.
+        exponents: Slopes m of the Woehler lines, N ~ S^-m.
+        repetitions: Number N of equal cycles; one a second of the run by default (1 Hz).
+        joints: All by default.
+
+    Returns:
+        DataArray (exponent, joint, component), peak to peak, N and N m.
+    """
+    import xarray as xr
+
+    need(run, "joint_load")
+    if not len(exponents) or not all(np.isfinite(m) and m > 0 for m in exponents):
+        raise InputError("exponents: give positive numbers, such as 3, 5 and 10")
+    times = run.dataset["time"].values
+    span = float(times[-1] - times[0])
+    count = span if repetitions is None else float(repetitions)
+    if not count > 0:
+        raise InputError("repetitions: give a positive number; a run of one sample has no cycles")
+    names = joint_names(run) if joints is None else list(joints)
+    where = [joint_position(run, name) for name in names]
+    load = rows(run, "joint_load", slice(None))[:, where]
+    found = np.zeros((len(exponents), len(names), len(COMPONENTS)))
+    for j in range(len(names)):
+        for c in range(len(COMPONENTS)):
+            counted = _count(load[:, j, c])
+            for k, m in enumerate(exponents):
+                found[k, j, c] = equivalent(counted[:, 0], counted[:, 2], float(m), count)
+    given = run.dataset["joint_load"]
+    return xr.DataArray(
+        found,
+        dims=("exponent", "joint", "component"),
+        coords={
+            "exponent": [float(m) for m in exponents],
+            "joint": names,
+            "component": given["component"],
+        },
+        attrs={
+            **given.attrs,
+            "long_name": f"damage-equivalent load range for {count:g} cycles",
+            "method": "rainflow (ASTM E1049) and linear damage (Palmgren, Miner)",
+        },
+        name="damage_equivalent",
+    )
+
+
+def load_duration(
+    run: Run, joint: str, quantity: str, bins: int = 40, model: Model | None = None
+) -> xr.DataArray:
+    """How long a quantity stays in each class of its range: (level) [s], classes of equal width."""
+    import xarray as xr
+
+    values, units = signal(run, joint, quantity, model)
+    if bins < 1:
+        raise InputError(f"bins: is {bins}; give a positive number of classes")
+    weights = trapezoid_weights(run.dataset["time"].values.astype(np.float64))
+    low, high = float(values.min()), float(values.max())
+    if high - low <= 1e-9 * max(abs(low), abs(high)):  # a constant: classes about it
+        reach = 1e-3 * abs(low) or 1.0
+        low, high = low - reach, high + reach
+    time, edges = np.histogram(values, bins=bins, range=(low, high), weights=weights)
+    level = {"long_name": f"centre of the class of {quantity}", "units": units}
+    return xr.DataArray(
+        time,
+        dims="level",
+        coords={"level": ("level", (edges[1:] + edges[:-1]) / 2, level)},
+        attrs={"long_name": "time in the class", "units": "s", "class_width": edges[1] - edges[0]},
+        name="load_duration",
+    )
+
+
+def spectrum(run: Run, joint: str, quantity: str, model: Model | None = None) -> xr.DataArray:
+    """One-sided power spectral density of a quantity about its mean: (frequency) [units^2/Hz].
+
+    Periodogram with a Hann window; samples at unequal times are interpolated linearly first.
+    """
+    import xarray as xr
+    from scipy.signal import periodogram
+
+    values, units = signal(run, joint, quantity, model)
+    times = run.dataset["time"].values.astype(np.float64)
+    if times.size < 8:
+        raise InputError(f"run holds {times.size} samples; a spectrum needs at least 8")
+    even = np.linspace(times[0], times[-1], times.size)
+    interval = float(even[1] - even[0])
+    if not np.allclose(times, even, rtol=0, atol=1e-6 * interval):
+        values = np.interp(even, times, values)
+    frequency, density = periodogram(values, fs=1 / interval, window="hann", detrend="constant")
+    return xr.DataArray(
+        density,
+        dims="frequency",
+        coords={"frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"})},
+        attrs={"long_name": f"spectral density of {quantity}", "units": f"({units})^2/Hz"},
+        name="spectrum",
+    )

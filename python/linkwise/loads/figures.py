@@ -1,0 +1,230 @@
+"""The figures of the report, as plotly describes them: plain data and layout.
+
+They are written by hand rather than by plotly's Python classes, which take longer to build than the
+loads to compute.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise._core import InputError
+from linkwise.loads.causes import Split
+from linkwise.loads.engineering import derive, joint_directions
+from linkwise.loads.fatigue import load_duration, spectrum
+from linkwise.loads.samples import Array, blocks, joint_names, model_of, rows, select
+from linkwise.plots import along_total
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
+    from linkwise.result import Run
+
+Figure = dict[str, Any]
+_HALVES = (("force", "N", ("fx", "fy", "fz")), ("moment", "N m", ("nx", "ny", "nz")))
+
+
+def packed(values: npt.ArrayLike) -> dict[str, str]:
+    """Numbers as plotly takes them in binary: four bytes each, enough for a screen."""
+    data = np.ascontiguousarray(values, dtype="<f4").tobytes()
+    return {"dtype": "f4", "bdata": base64.b64encode(data).decode("ascii")}
+
+
+def _layout(title: str, x: str, y: str, **more: Any) -> Figure:
+    return {
+        "title": {"text": title, "font": {"size": 14}, "x": 0.02},
+        "xaxis": {"title": {"text": x}},
+        "yaxis": {"title": {"text": y}},
+        "margin": {"l": 60, "r": 10, "t": 40, "b": 45},
+        "legend": {"orientation": "h", "y": -0.22},
+        "hovermode": "x unified",
+        **more,
+    }
+
+
+def _line(name: str, x: Any, y: npt.ArrayLike, **more: Any) -> Figure:
+    line = {"width": 1.5, **more.pop("line", {})}
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": name,
+        "x": x,
+        "y": packed(y),
+        "line": line,
+    } | more
+
+
+def _histories(times: Any, load: Array) -> list[Figure]:
+    made = []
+    for k, (half, unit, components) in enumerate(_HALVES):
+        part = load[:, 3 * k : 3 * k + 3]
+        data = [_line(name, times, part[:, c]) for c, name in enumerate(components)]
+        data.append(_line("size", times, np.linalg.norm(part, axis=1), line={"color": "black"}))
+        layout = _layout(half.capitalize(), "time [s]", f"{half} [{unit}]")
+        made.append({"data": data, "layout": layout})
+    return made
+
+
+def _areas(times: Any, shares: Array, causes: list[str]) -> list[Figure]:
+    """Stacked areas: what adds to the size above zero, what relieves below."""
+    colours = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
+    made = []
+    for k, (half, unit, _) in enumerate(_HALVES):
+        parts, total = along_total(shares[..., 3 * k : 3 * k + 3])
+        data = []
+        for sign, group in ((1.0, "up"), (-1.0, "down")):
+            for c, cause in enumerate(causes):
+                values = sign * np.maximum(sign * parts[:, c], 0)
+                style = {
+                    "stackgroup": group,
+                    "line": {"width": 0, "color": colours[c % len(colours)]},
+                    "legendgroup": cause,
+                    "showlegend": sign > 0,
+                }
+                data.append(_line(cause, times, values, **style))
+        data.append(_line("total", times, total, line={"color": "black"}))
+        layout = _layout(f"{half.capitalize()} by cause", "time [s]", f"{half} [{unit}]")
+        made.append({"data": data, "layout": layout})
+    return made
+
+
+def _across(direction: Array) -> Array:
+    """Two axes (2, 3) across an axis: the joint frame's own where the axis is one of them."""
+    helper = np.eye(3)[(int(np.argmax(np.abs(direction))) + 1) % 3]
+    first = helper - (helper @ direction) * direction
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(direction, first)])
+
+
+def _polar(load: Array, direction: Array) -> Figure:
+    """The radial force's size and direction, as the outboard body feels it."""
+    if np.isnan(direction).any():
+        raise InputError("no axis")
+    x, y = _across(direction) @ load[:, :3].T
+    trace = {
+        "type": "scatterpolar",
+        "mode": "lines",
+        "r": packed(np.hypot(x, y)),
+        "theta": packed(np.degrees(np.arctan2(y, x))),
+        "line": {"width": 1.2},
+    }
+    polar = {"radialaxis": {"title": {"text": "N"}}}
+    title = {"text": "Radial force about the axis, in the joint frame", "font": {"size": 14}}
+    return {
+        "data": [trace],
+        "layout": {"title": title, "polar": polar, "margin": {"t": 60, "b": 30}},
+    }
+
+
+def _spectra(run: Run, joint: str) -> Figure:
+    data = []
+    for component in ("fx", "fy", "fz"):
+        found = spectrum(run, joint, component)
+        frequency = found["frequency"].values[1:]
+        data.append(_line(component, packed(frequency), np.maximum(found.values[1:], 1e-30)))
+    layout = _layout("Spectral density of the force", "frequency [Hz]", "N²/Hz")
+    layout["xaxis"]["type"] = layout["yaxis"]["type"] = "log"
+    return {"data": data, "layout": layout}
+
+
+def _duration(run: Run, joint: str, model: Model) -> Figure:
+    found = load_duration(run, joint, "force", model=model)
+    trace = {
+        "type": "bar",
+        "x": packed(found["level"].values),
+        "y": packed(found.values),
+        "width": float(found.attrs["class_width"]),
+    }
+    return {"data": [trace], "layout": _layout("Load duration", "force [N]", "time [s]")}
+
+
+def joint_figures(
+    run: Run, joints: list[str], every: int, model: Model | None
+) -> dict[str, list[Figure]]:
+    """The figures of each joint, drawing one sample of `every`."""
+    machine = model_of(run, model)
+    found = select(run, machine)
+    directions = joint_directions(machine)[found.joints]
+    where = [joint_names(run).index(joint) for joint in joints]
+    load = rows(run, "joint_load", slice(None))[::every][:, where]
+    times = packed(run.dataset["time"].values[::every])
+    shares, causes = _thinned_shares(run, machine, every, where)
+    made: dict[str, list[Figure]] = {}
+    for j, joint in enumerate(joints):
+        figures = _histories(times, load[:, j])
+        if shares is not None:
+            figures += _areas(times, shares[:, :, j], causes)
+        own, direction = load[:, j], directions[where[j]]
+        optional: tuple[tuple[Callable[..., Figure], tuple[Any, ...]], ...] = (
+            (_engineering, (times, own, direction)),
+            (_polar, (own, direction)),
+            (_spectra, (run, joint)),
+            (_duration, (run, joint, machine)),
+        )
+        for make, arguments in optional:
+            # An InputError says that this joint or run has no such figure.
+            with contextlib.suppress(InputError):
+                figures.append(make(*arguments))
+        made[joint] = figures
+    return made
+
+
+def _engineering(times: Any, load: Array, direction: Array) -> Figure:
+    if np.isnan(direction).any():
+        raise InputError("no axis")
+    found = derive(load[:, None], direction[None])
+    data = [_line(name.replace("_", " "), times, found[name][:, 0]) for name in ("axial", "radial")]
+    for name in ("torque", "tilting_moment"):
+        data.append(_line(name.replace("_", " "), times, found[name][:, 0], yaxis="y2"))
+    layout = _layout("Along and across the axis", "time [s]", "force [N]")
+    layout["yaxis2"] = {"title": {"text": "moment [N m]"}, "overlaying": "y", "side": "right"}
+    layout["margin"]["r"] = 60
+    return {"data": data, "layout": layout}
+
+
+def _thinned_shares(
+    run: Run, model: Model, every: int, where: list[int]
+) -> tuple[Array | None, list[str]]:
+    try:
+        split = Split(run, "force", model)
+    except InputError:
+        return None, []
+    parts = []
+    for block in blocks(run, 8 * 60 * model.n_joints):
+        keep = np.arange(block.start, block.stop) % every == 0
+        parts.append(split.shares(block)[keep][:, :, where])
+    return np.concatenate(parts), split.names
+
+
+def energy_figure(run: Run, every: int, model: Model | None) -> list[Figure]:
+    """Energies and works, and what does not add up; nothing for runs without energies."""
+    from linkwise.loads.energy import energy_balance
+
+    try:
+        balance = energy_balance(run, model)
+    except InputError:
+        return []
+    times = packed(balance["time"].values[::every])
+    lines = {
+        str(name): _line(values.attrs["long_name"], times, values.values[::every])
+        for name, values in balance.data_vars.items()
+    }
+    residual = lines.pop("residual")
+    step = [] if "step_size" not in run.dataset else [_steps(run, times, every)]
+    return [
+        {"data": list(lines.values()), "layout": _layout("Energy", "time [s]", "energy [J]")},
+        {"data": [residual], "layout": _layout("What does not add up", "time [s]", "energy [J]")},
+        *step,
+    ]
+
+
+def _steps(run: Run, times: Any, every: int) -> Figure:
+    layout = _layout("Integration step", "time [s]", "step [s]")
+    layout["yaxis"]["type"] = "log"
+    line = _line("step", times, np.maximum(run.dataset["step_size"].values[::every], 1e-30))
+    return {"data": [line], "layout": layout}

@@ -1,0 +1,250 @@
+"""The report: one HTML file with interactive figures that opens without a network."""
+
+from __future__ import annotations
+
+import json
+import os
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise._core import InputError
+from linkwise.loads.figures import energy_figure, joint_figures
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from linkwise._core import Model
+    from linkwise.result import Run
+
+# Joints with figures, the most loaded first: each takes some 200 kB.
+MOST_JOINTS = 16
+# Samples drawn of a longer run; tables use them all.
+MOST_SAMPLES = 2000
+
+_STYLE = """
+body { font: 14px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 1200px; padding: 1rem 2rem;
+  color: #1a1a1a; background: #fff }
+h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2rem }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; width: 100% }
+td { white-space: nowrap }
+th, td { padding: .2rem .6rem; text-align: right; border-bottom: 1px solid #ddd }
+th:first-child, td:first-child { text-align: left }
+tr.over td { color: #b00020; font-weight: 600 }
+pre { background: #f5f5f5; padding: 1rem; overflow-x: auto } .scroll { overflow-x: auto }
+.grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(480px, 1fr)); gap: 1rem }
+.figure { height: 340px } .note { color: #555 } select { font: inherit; padding: .2rem .5rem }
+"""
+_SCRIPT = """
+const figures = JSON.parse(document.getElementById("figures").textContent);
+const options = {responsive: true, displaylogo: false};
+function draw(place, list) {
+  place.querySelectorAll(".figure").forEach(old => Plotly.purge(old));
+  place.replaceChildren();
+  // All boxes before the first figure: the grid's width of one box depends on the others.
+  const boxes = list.map(() => place.appendChild(document.createElement("div")));
+  list.forEach((figure, k) => {
+    boxes[k].className = "figure";
+    Plotly.newPlot(boxes[k], figure.data, figure.layout, options);
+  });
+}
+const chooser = document.getElementById("joint");
+const place = document.getElementById("joint-figures");
+chooser.addEventListener("change", () => draw(place, figures.joints[chooser.value]));
+draw(place, figures.joints[chooser.value]);
+draw(document.getElementById("energy-figures"), figures.energy);
+"""
+
+
+def _number(value: float, digits: int = 4) -> str:
+    return "" if not np.isfinite(value) else f"{value:.{digits}g}"
+
+
+def _row(cells: list[str], tag: str = "td", style: str = "") -> str:
+    inner = "".join(f"<{tag}>{cell}</{tag}>" for cell in cells)
+    return f'<tr class="{style}">{inner}</tr>' if style else f"<tr>{inner}</tr>"
+
+
+def _table(headings: list[str], rows: list[str]) -> str:
+    head = _row([escape(h) for h in headings], "th")
+    return f'<div class="scroll"><table>{head}{"".join(rows)}</table></div>'
+
+
+def _peak_table(summary: xr.Dataset, limits: xr.Dataset | None) -> str:
+    names = [str(q) for q in summary["quantity"].values]
+    units = [str(u) for u in summary["quantity_units"].values]
+    peak, when = summary["peak"].values, summary["peak_time"].values
+    bound = None if limits is None else limits["plus_minus"].values
+    headings = ["joint"]
+    for name, unit in zip(names, units, strict=True):
+        headings += [f"{name.replace('_', ' ')} [{unit}]", "at [s]"]
+    rows = []
+    for j, joint in enumerate(summary["joint"].values):
+        cells = [escape(str(joint))]
+        for k in range(len(names)):
+            shown = _number(peak[k, j])
+            if shown and bound is not None and np.isfinite(bound[k, j]):
+                shown += f" ± {_number(bound[k, j], 1)}"
+            cells += [shown, _number(when[k, j])]
+        rows.append(_row(cells))
+    return _table(headings, rows)
+
+
+def _margin_table(summary: xr.Dataset, left: xr.Dataset) -> str:
+    rows = []
+    for k, quantity in enumerate(left["quantity"].values):
+        for j, joint in enumerate(left["joint"].values):
+            rating, use = float(left["rating"][k, j]), float(left["use"][k, j])
+            if not np.isfinite(rating):
+                continue
+            cells = [
+                escape(str(joint)),
+                f"{quantity} [{summary['quantity_units'].values[k]}]".replace("_", " "),
+                _number(float(summary["peak"][k, j])),
+                _number(rating),
+                f"{100 * use:.1f} %",
+                f"{100 * float(left['margin'][k, j]):.1f} %",
+            ]
+            rows.append((use, _row(cells, style="over" if use > 1 else "")))
+    ordered = [row for _, row in sorted(rows, key=lambda item: -item[0])]
+    return _table(["joint", "quantity", "peak", "rating", "use", "margin"], ordered)
+
+
+def _envelope_table(run: Run) -> str:
+    from linkwise.loads.peaks import envelope
+
+    found = envelope(run)
+    components = [str(c) for c in found["component"].values]
+    headings = ["joint", *(f"{c} [{'N' if c[0] == 'f' else 'N m'}]" for c in components)]
+    low, high = found["minimum"].values, found["maximum"].values
+    rows = [
+        _row(
+            [
+                escape(str(joint)),
+                *(f"{_number(a)} .. {_number(b)}" for a, b in zip(low[j], high[j], strict=True)),
+            ]
+        )
+        for j, joint in enumerate(found["joint"].values)
+    ]
+    return _table(headings, rows)
+
+
+def _fatigue_table(run: Run, joints: list[str]) -> str:
+    from linkwise.loads.fatigue import damage_equivalent
+
+    found = damage_equivalent(run, joints=joints)
+    components = [str(c) for c in found["component"].values]
+    rows = [
+        _row(
+            [
+                escape(joint),
+                f"{float(m):g}",
+                *(_number(x) for x in found.values[k, j]),
+            ]
+        )
+        for j, joint in enumerate(joints)
+        for k, m in enumerate(found["exponent"].values)
+    ]
+    return _table(["joint", "exponent m", *components], rows)
+
+
+def _health(run: Run, limits: xr.Dataset | None) -> str:
+    attrs = run.dataset.attrs
+    options = json.loads(attrs.get("options", "{}"))
+    facts = [
+        ("outcome", run.outcome),
+        ("model", f"{attrs.get('model', '')} ({attrs.get('model_joints', '?')} joints)"),
+        ("model hash", str(attrs.get("model_hash", ""))[:16]),
+        ("method", f"{attrs.get('method', '')} {attrs.get('solver', '')}".replace(" none", "")),
+        ("integrator", f"{options.get('integrator')}, tolerance {options.get('tolerance')}"),
+        ("steps, evaluations", f"{attrs.get('total_steps')}, {attrs.get('total_evaluations')}"),
+        ("created", str(attrs.get("created", ""))),
+        ("linkwise", str(attrs.get("linkwise_version", ""))),
+    ]
+    if limits is not None:
+        force = limits["algebraic"].sel(quantity="force").values
+        facts.append(("largest algebraic error of a force", f"{np.nanmax(force):.1e} N"))
+        certain = np.isfinite(limits["integration"].values).any()
+        text = (
+            "bounded by a run at a tighter tolerance"
+            if certain
+            else "not bounded; add --certify SCENARIO"
+        )
+        facts.append(("integration error", text))
+    return _table(["", ""], [_row([escape(a), escape(b)]) for a, b in facts])
+
+
+def _plotly() -> Any:
+    try:
+        import plotly.offline
+    except ModuleNotFoundError:
+        raise InputError(
+            "the report needs the package plotly; pip install 'linkwise[report]'"
+        ) from None
+    return plotly
+
+
+def _script_json(value: Any) -> str:
+    """JSON that cannot end the script element it stands in."""
+    return json.dumps(value).replace("<", "\\u003c")
+
+
+def write_report(
+    run: Run, path: str | os.PathLike[str], found: dict[str, Any], model: Model | None = None
+) -> Path:
+    """Write the report of a run.
+
+    Args:
+        run: Holds `joint_load`; figures that need other quantities are left out without them.
+        path: The HTML file, replaced where it exists.
+        found: "summary", and "bounds" and "margins" or None, as the functions of that name give.
+        model: The machine, where the run does not hold it.
+    """
+    plotly = _plotly()
+    target = Path(path)
+    summary, limits, left = found["summary"], found.get("bounds"), found.get("margins")
+    names = [str(name) for name in summary["joint"].values]
+    force = summary["peak"].sel(quantity="force").values
+    ranked = [names[k] for k in np.argsort(-force, kind="stable")[:MOST_JOINTS]]
+    drawn = [name for name in names if name in set(ranked)]
+    every = max(1, -(-run.dataset.sizes["time"] // MOST_SAMPLES))
+    content = {
+        "joints": joint_figures(run, drawn, every, model),
+        "energy": energy_figure(run, every, model),
+    }
+    chooser = "".join(f"<option>{escape(name)}</option>" for name in drawn)
+    title = escape(f"Joint loads of {run.dataset.attrs.get('model', 'a machine')}")
+    fewer = (
+        f" of the {len(drawn)} most loaded of {len(names)} joints"
+        if len(drawn) < len(names)
+        else ""
+    )
+    scenario = str(run.dataset.attrs.get("scenario", ""))
+    parts = [
+        "<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'>",
+        "<meta http-equiv='Content-Security-Policy' content=\"default-src 'none'; "
+        "script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:\">",
+        f"<title>{title}</title><style>{_STYLE}</style></head><body><h1>{title}</h1>",
+        "<p class='note'>Wrench that the inboard body exerts on the outboard body, in the joint "
+        "frame fixed in the outboard body, moments about the joint point. SI units. ± is the "
+        "bound of algebraic and integration error.</p>",
+        f"<h2>Peaks</h2>{_peak_table(summary, limits)}",
+        f"<h2>Against the ratings</h2>{_margin_table(summary, left)}" if left is not None else "",
+        f"<h2>Envelopes</h2>{_envelope_table(run)}",
+        f"<h2>Damage-equivalent ranges{fewer}</h2><p class='note'>Peak to peak, one cycle a second "
+        f"of the run.</p>{_fatigue_table(run, drawn)}",
+        f"<h2>Over time{fewer}</h2><label>Joint <select id='joint'>{chooser}</select></label>",
+        "<div id='joint-figures' class='grid'></div>",
+        "<h2>Energy and solver</h2><div id='energy-figures' class='grid'></div>",
+        _health(run, limits),
+        f"<h2>Scenario</h2><pre>{escape(scenario)}</pre>" if scenario else "",
+        f"<script type='application/json' id='figures'>{_script_json(content)}</script>",
+        f"<script>{plotly.offline.get_plotlyjs()}</script><script>{_SCRIPT}</script></body></html>\n",
+    ]
+    try:
+        target.write_text("".join(parts), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{str(path)!r}: cannot write it ({error.strerror})") from None
+    return target

@@ -1,0 +1,183 @@
+"""Peaks with their time and simultaneous wrench, envelopes, mean, RMS and duty."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise.loads.engineering import (
+    QUANTITIES,
+    derived_rows,
+    has_power,
+    joint_directions,
+)
+from linkwise.loads.samples import (
+    Array,
+    blocks,
+    joint_names,
+    model_of,
+    need,
+    rows,
+    select,
+    trapezoid_weights,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from linkwise._core import Model
+    from linkwise.result import Run
+
+# A load counts as on duty above this share of its peak.
+DUTY_LEVEL = 0.1
+
+
+class _Statistics:
+    """What one pass over the samples collects, (quantity, joint) each."""
+
+    def __init__(self, quantities: int, joints: int) -> None:
+        shape = (quantities, joints)
+        self.largest = np.full(shape, -1.0)
+        self.peak, self.peak_time = np.full(shape, np.nan), np.full(shape, np.nan)
+        self.minimum, self.maximum = np.full(shape, np.inf), np.full(shape, -np.inf)
+        self.total, self.squares = np.zeros(shape), np.zeros(shape)
+        self.sampling = np.zeros(shape)
+        self.wrench = np.full((*shape, 6), np.nan)
+
+    def add(
+        self, values: Array, load: Array, times: Array, weights: Array, first: int, count: int
+    ) -> None:
+        """Samples first ... first + count - 1 of values (quantity, time, joint); the others are
+        their neighbours."""
+        inner = values[:, first : first + count]
+        self.minimum = np.minimum(self.minimum, inner.min(axis=1))
+        self.maximum = np.maximum(self.maximum, inner.max(axis=1))
+        self.total += np.einsum("t,qtj->qj", weights, inner)
+        self.squares += np.einsum("t,qtj->qj", weights, inner**2)
+        size = np.abs(inner)
+        at = np.argmax(np.where(np.isnan(size), -1.0, size), axis=1)
+        best = np.take_along_axis(size, at[:, None], axis=1)[:, 0]
+        better = best > self.largest  # False for NaN
+        quantity, joint = np.nonzero(better)
+        k = at[better]
+        self.largest[better] = best[better]
+        self.peak[better] = inner[quantity, k, joint]
+        self.peak_time[better] = times[first + k]
+        self.wrench[better] = load[first + k, joint]
+        here = first + k
+        last = values.shape[1] - 1
+        inside = (here > 0) & (here < last)
+        before, after = np.maximum(here - 1, 0), np.minimum(here + 1, last)
+        bend = values[quantity, before, joint] + values[quantity, after, joint]
+        bend -= 2 * values[quantity, here, joint]
+        self.sampling[better] = np.where(inside, np.abs(bend) / 8, 0.0)
+
+
+def _with_neighbours(where: slice, count: int) -> slice:
+    return slice(max(0, where.start - 1), min(count, where.stop + 1))
+
+
+def summary(run: Run, model: Model | None = None) -> xr.Dataset:
+    """Per quantity and joint the peak, when, and the whole wrench at that moment.
+
+    Args:
+        run: Holds `joint_load`; with `velocity` and `drive_torque` also drive power.
+        model: The machine, where the run does not hold it.
+
+    Returns:
+        Dataset over (quantity, joint): `peak` (the value of largest magnitude, with its sign),
+        `peak_time`, `wrench` (component) at that time, `minimum`, `maximum`, `mean`, `rms` (over
+        time, by the trapezoidal rule), `duty` (share of the time above a tenth of the peak) and
+        `sampling` (how much higher a smooth peak between the samples may be: an eighth of the
+        second difference). NaN where a joint has no single axis.
+    """
+    import xarray as xr
+
+    need(run, "joint_load")
+    machine = model_of(run, model)
+    found = select(run, machine)
+    directions = joint_directions(machine)[found.joints]
+    names = [name for name in QUANTITIES if name != "drive_power" or has_power(run)]
+    times = run.dataset["time"].values.astype(np.float64)
+    weights = trapezoid_weights(times)
+    row_bytes = 8 * (6 + 3 * len(names)) * max(1, found.joints.size)
+    collected = _Statistics(len(names), found.joints.size)
+    for where in blocks(run, row_bytes):
+        wide = _with_neighbours(where, times.size)
+        values = derived_rows(run, found, directions, wide)
+        stacked = np.stack([values[name] for name in names])
+        load = rows(run, "joint_load", wide)
+        inner = where.start - wide.start, where.stop - where.start
+        collected.add(stacked, load, times[wide], weights[where], *inner)
+    duty = np.zeros_like(collected.peak)
+    for where in blocks(run, row_bytes):
+        values = derived_rows(run, found, directions, where)
+        stacked = np.abs(np.stack([values[name] for name in names]))
+        above = stacked > DUTY_LEVEL * collected.largest[:, None]
+        duty += np.einsum("t,qtj->qj", weights[where], above)
+    span = weights.sum()
+    absent = np.isnan(collected.peak)
+    over = {
+        "peak": (collected.peak, "value of largest magnitude"),
+        "minimum": (np.where(absent, np.nan, collected.minimum), "smallest value"),
+        "maximum": (np.where(absent, np.nan, collected.maximum), "largest value"),
+        "mean": (collected.total / span, "mean over time"),
+        "rms": (np.sqrt(collected.squares / span), "root mean square over time"),
+        "sampling": (
+            np.where(absent, np.nan, collected.sampling),
+            "what a smooth peak between samples may add",
+        ),
+    }
+    dims = ("quantity", "joint")
+    by_quantity = {"units": "of the quantity, see quantity_units"}
+    data: dict[str, Any] = {
+        name: (dims, array, {"long_name": text, **by_quantity})
+        for name, (array, text) in over.items()
+    }
+    attrs = {"long_name": "time of the peak", "units": "s"}
+    data["peak_time"] = (dims, collected.peak_time, attrs)
+    about_duty = f"share of the time above {DUTY_LEVEL:g} of the peak's magnitude"
+    duty = np.where(absent, np.nan, np.minimum(duty / span, 1.0))
+    data["duty"] = (dims, duty, {"long_name": about_duty, "units": "1"})
+    given = run.dataset["joint_load"]
+    data["wrench"] = ((*dims, "component"), collected.wrench, dict(given.attrs))
+    return xr.Dataset(
+        data,
+        coords={
+            "quantity": names,
+            "quantity_units": ("quantity", [QUANTITIES[name].units for name in names]),
+            "joint": ("joint", joint_names(run)),
+            "component": given["component"],
+        },
+    )
+
+
+def envelope(run: Run) -> xr.Dataset:
+    """Smallest and largest value of every load component and when: (joint, component).
+
+    Returns:
+        Dataset: `minimum`, `minimum_time`, `maximum`, `maximum_time`; frame as `joint_load`.
+    """
+    import xarray as xr
+
+    need(run, "joint_load")
+    given = run.dataset["joint_load"]
+    times = run.dataset["time"].values
+    shape = (given.sizes["joint"], given.sizes["component"])
+    found = {"minimum": np.full(shape, np.inf), "maximum": np.full(shape, -np.inf)}
+    when = {name: np.zeros(shape) for name in found}
+    for where in blocks(run, 48 * shape[0]):
+        load = rows(run, "joint_load", where)
+        for name, sign in (("minimum", -1.0), ("maximum", 1.0)):
+            at = np.argmax(sign * load, axis=0)
+            value = np.take_along_axis(load, at[None], axis=0)[0]
+            better = sign * value > sign * found[name]
+            found[name][better] = value[better]
+            when[name][better] = times[where][at[better]]
+    dims = ("joint", "component")
+    data = {name: (dims, values, dict(given.attrs)) for name, values in found.items()}
+    for name, values in when.items():
+        data[f"{name}_time"] = (dims, values, {"long_name": f"time of the {name}", "units": "s"})
+    coords = {"joint": ("joint", joint_names(run)), "component": given["component"]}
+    return xr.Dataset(data, coords=coords)

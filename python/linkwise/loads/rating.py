@@ -1,0 +1,94 @@
+"""What bearings and gears may carry, against what they do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from linkwise._core import InputError
+from linkwise.io.complaint import near
+from linkwise.loads.engineering import QUANTITIES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class Rating:
+    """The largest magnitudes that a joint may carry, SI; None: not rated."""
+
+    force: float | None = None
+    axial: float | None = None
+    radial: float | None = None
+    moment: float | None = None
+    tilting_moment: float | None = None
+    torque: float | None = None
+    drive_power: float | None = None
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+                raise InputError(f"rating {field.name}: {value!r} is not a number; give one in SI")
+            if not (np.isfinite(value) and value > 0):
+                raise InputError(f"rating {field.name}: is {value:g}; give a positive number in SI")
+
+
+def margins(
+    summary: xr.Dataset, ratings: Mapping[str, Rating], plus_minus: xr.DataArray | None = None
+) -> xr.Dataset:
+    """How far the peaks stay below the ratings.
+
+    Args:
+        summary: Of `linkwise.loads.summary`.
+        ratings: By joint name.
+        plus_minus: Error bounds (quantity, joint) of the peaks, which count against the margin.
+
+    Returns:
+        Dataset over (quantity, joint): `rating`, `use` (peak with its bound over the rating) and
+        `margin` (rating over that peak, less 1; negative: overloaded). NaN where nothing is rated.
+    """
+    import xarray as xr
+
+    joints = [str(name) for name in summary["joint"].values]
+    names = [str(name) for name in summary["quantity"].values]
+    table = np.full((len(names), len(joints)), np.nan)
+    for joint, rating in ratings.items():
+        if joint not in joints:
+            raise InputError(
+                f"rating for joint {joint!r}: run holds no such joint; "
+                f"{near(joint, joints, 'the joints are')}"
+            )
+        for field in fields(rating):
+            value = getattr(rating, field.name)
+            if value is None:
+                continue
+            if field.name not in names:
+                raise InputError(
+                    f"rating for joint {joint!r}: the run gives no {field.name}; record velocity "
+                    "and drive_torque"
+                )
+            k, j = names.index(field.name), joints.index(joint)
+            if np.isnan(summary["peak"].values[k, j]):
+                raise InputError(
+                    f"rating for joint {joint!r}: it has no single axis, so no "
+                    f"{QUANTITIES[field.name].long_name}; rate force or moment"
+                )
+            table[k, j] = value
+    peak = np.abs(summary["peak"].values)
+    if plus_minus is not None:
+        peak = peak + plus_minus.values
+    with np.errstate(divide="ignore"):
+        margin = table / peak - 1
+    dims = ("quantity", "joint")
+    data = {
+        "rating": (dims, table, {"long_name": "rating", "units": "of the quantity"}),
+        "use": (dims, peak / table, {"long_name": "peak over rating", "units": "1"}),
+        "margin": (dims, margin, {"long_name": "rating over peak, less 1", "units": "1"}),
+    }
+    return xr.Dataset(data, coords={"quantity": names, "joint": ("joint", joints)})

@@ -1,0 +1,139 @@
+"""The samples of a run as arrays in the order that the core takes, block by block."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise._core import InputError
+from linkwise.io.complaint import near
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
+    from linkwise.result import Run
+
+Array = npt.NDArray[np.float64]
+# What is held in one go, in bytes: a run may be larger than memory.
+_BLOCK_BYTES = 64 << 20
+
+
+def need(run: Run, *names: str) -> None:
+    """InputError where the run lacks one of these variables, or samples."""
+    for name in names:
+        if name not in run.dataset:
+            raise InputError(f'run holds no {name}; record the quantity "{name}"')
+    if run.dataset.sizes["time"] == 0:
+        raise InputError("run holds no samples: it stopped before the first was written")
+
+
+def joint_names(run: Run) -> list[str]:
+    """The joints whose loads the run holds."""
+    need(run, "joint_load")
+    return [str(name) for name in run.dataset["joint"].values]
+
+
+def joint_position(run: Run, joint: str) -> int:
+    """Which of the recorded joints this is."""
+    names = joint_names(run)
+    if joint not in names:
+        raise InputError(f"run holds no joint {joint!r}; {near(joint, names, 'the joints are')}")
+    return names.index(joint)
+
+
+def model_of(run: Run, model: Model | None) -> Model:
+    """The machine of the run: the one given, checked, or the one inside the run."""
+    if model is None:
+        return run.load_model()
+    attrs = run.dataset.attrs
+    size = {"model_joints": model.n_joints, "model_degrees_of_freedom": model.nv}
+    same = all(attrs.get(name, count) == count for name, count in size.items())
+    if not (same and set(joint_names(run)) <= set(model.joint_names)):
+        raise InputError("model: is not the one that the run was made with; give that one")
+    return model
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The recorded joints in the model: their indices, and which joint each of their dofs has."""
+
+    model: Model
+    joints: npt.NDArray[np.intp]
+    owner: npt.NDArray[np.intp]
+
+    @property
+    def whole(self) -> bool:
+        return bool(self.joints.size == self.model.n_joints)
+
+
+def select(run: Run, model: Model) -> Selection:
+    where = {name: k for k, name in enumerate(model.joint_names)}
+    joints = np.array([where[name] for name in joint_names(run)], dtype=np.intp)
+    nv = np.asarray(model.joint_nv, dtype=np.intp)[joints]
+    return Selection(model, joints, np.repeat(np.arange(joints.size), nv))
+
+
+def need_whole(run: Run, model: Model, *names: str) -> Selection:
+    """The selection of a run that holds these quantities of every joint."""
+    need(run, *names)
+    found = select(run, model)
+    if not found.whole:
+        raise InputError(
+            f"run holds {found.joints.size} of {model.n_joints} joints; this needs a run of all "
+            "joints (simulate without joints=)"
+        )
+    return found
+
+
+def blocks(run: Run, row_bytes: int) -> Iterator[slice]:
+    """Slices of time whose rows fit into memory."""
+    count = run.dataset.sizes["time"]
+    rows = max(1, _BLOCK_BYTES // max(1, row_bytes))
+    for start in range(0, count, rows):
+        yield slice(start, min(start + rows, count))
+
+
+def rows(run: Run, name: str, where: slice | Sequence[int]) -> Array:
+    """A variable's rows as (time, ...) in the model's order."""
+    variable = run.dataset[name]
+    last = [dim for dim in variable.dims if dim != "time"]
+    return np.asarray(variable.transpose("time", *last)[where].values, dtype=np.float64)
+
+
+def external(run: Run, model: Model, where: slice) -> Array | None:
+    """The wrenches on all bodies (time, body, 6), None where there are none.
+
+    A run with wrenches that did not record them cannot be evaluated again.
+    """
+    if "external_wrench" not in run.dataset:
+        if json.loads(run.dataset.attrs.get("wrenches", "{}")):
+            raise InputError('run holds no external_wrench; record the quantity "external_wrench"')
+        return None
+    given = run.dataset["external_wrench"]
+    bodies = {name: k for k, name in enumerate(model.body_names)}
+    values = rows(run, "external_wrench", where)
+    whole = np.zeros((len(values), model.n_joints, 6))
+    whole[:, [bodies[str(name)] for name in given["wrenched_body"].values]] = values
+    return whole
+
+
+def given_motions(run: Run) -> dict[str, str]:
+    """The joints whose motion was given, "locked" or "motion"."""
+    drives: dict[str, Any] = json.loads(run.dataset.attrs.get("drives", "{}"))
+    kinds = {joint: str(drive.get("kind")) for joint, drive in drives.items()}
+    return {joint: kind for joint, kind in kinds.items() if kind in ("locked", "motion")}
+
+
+def trapezoid_weights(times: Array) -> Array:
+    """Seconds that each sample stands for."""
+    if times.size < 2:
+        return np.ones(times.size)
+    gaps = np.diff(times)
+    weights = np.zeros(times.size)
+    weights[:-1] += gaps / 2
+    weights[1:] += gaps / 2
+    return weights

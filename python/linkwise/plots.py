@@ -1,0 +1,98 @@
+"""Figures of a run, by matplotlib: `run.plot.loads("elbow")`, `.split("elbow")`, `.energy()`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise._core import InputError
+
+if TYPE_CHECKING:
+    from linkwise.loads.causes import By
+    from linkwise.result import Run
+
+_HALVES = (("force", "N", ("fx", "fy", "fz")), ("moment", "N m", ("nx", "ny", "nz")))
+
+
+def _figure(rows: int) -> tuple[Any, Any]:
+    try:
+        from matplotlib import figure
+    except ModuleNotFoundError:
+        raise InputError("plots need matplotlib; pip install 'linkwise[plot]'") from None
+    made = figure.Figure(figsize=(8.0, 2.6 * rows), layout="constrained")
+    axes = np.atleast_1d(made.subplots(rows, 1, sharex=True))
+    for axis in axes:
+        axis.spines[["top", "right"]].set_visible(False)
+    axes[-1].set_xlabel("time [s]")
+    return made, axes
+
+
+class RunPlots:
+    """The figures of one run; every method returns the matplotlib Figure."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+
+    def loads(self, joint: str) -> Any:
+        """Force and moment of a joint over time, by component (joint frame, joint point)."""
+        from linkwise.loads.samples import joint_position
+
+        load = self._run.dataset["joint_load"].isel(joint=joint_position(self._run, joint))
+        figure, axes = _figure(2)
+        times = self._run.dataset["time"].values
+        for axis, (half, unit, components) in zip(axes, _HALVES, strict=True):
+            for name in components:
+                axis.plot(times, load.sel(component=name).values, label=name, linewidth=1.2)
+            axis.set_ylabel(f"{half} [{unit}]")
+            axis.legend(loc="upper right", ncols=3, frameon=False)
+        figure.suptitle(f"Load of {joint}: inboard on outboard body, joint frame")
+        return figure
+
+    def split(self, joint: str, by: By = "force") -> Any:
+        """What each cause adds to the size of a joint's force and moment.
+
+        A cause's share is its part along the total, so that the shares add up to the size; a
+        negative share relieves the joint.
+        """
+        from linkwise.loads.causes import split
+        from linkwise.loads.samples import joint_position
+
+        where = joint_position(self._run, joint)
+        shares = split(self._run, by).isel(joint=where)
+        times, causes = shares["time"].values, [str(c) for c in shares["cause"].values]
+        figure, axes = _figure(2)
+        for k, (axis, (half, unit, _)) in enumerate(zip(axes, _HALVES, strict=True)):
+            parts, total = along_total(shares.values[..., 3 * k : 3 * k + 3])
+            up, down = np.maximum(parts, 0), np.minimum(parts, 0)
+            areas = axis.stackplot(times, up.T, labels=causes, linewidth=0)
+            colours = [area.get_facecolor()[0] for area in areas]
+            axis.stackplot(times, down.T, colors=colours, linewidth=0)
+            axis.plot(times, total, color="black", linewidth=1.2, label="total")
+            axis.set_ylabel(f"{half} [{unit}]")
+        axes[0].legend(loc="upper right", ncols=4, frameon=False)
+        figure.suptitle(f"Load of {joint} by cause")
+        return figure
+
+    def energy(self) -> Any:
+        """Energies and works over time, and what does not add up."""
+        from linkwise.loads.energy import energy_balance
+
+        balance = energy_balance(self._run)
+        figure, axes = _figure(2)
+        for name in balance.data_vars:
+            axis = axes[1] if name == "residual" else axes[0]
+            label = balance[name].attrs["long_name"]
+            axis.plot(balance["time"].values, balance[name].values, label=label, linewidth=1.2)
+        for axis in axes:
+            axis.set_ylabel("energy [J]")
+            axis.legend(loc="best", frameon=False)
+        return figure
+
+
+def along_total(shares: Any) -> tuple[Any, Any]:
+    """Shares (time, cause, 3) along their sum (time, cause), and the size of the sum (time,)."""
+    total = shares.sum(axis=1)
+    size = np.linalg.norm(total, axis=-1)
+    direction = total / np.where(size > 0, size, 1.0)[:, None]
+    return np.einsum("tci,ti->tc", shares, direction), size

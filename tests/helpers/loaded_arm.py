@@ -1,0 +1,45 @@
+"""A small arm that loads its joints in every way, and a smooth motion for it."""
+
+import numpy as np
+
+import linkwise as lw
+
+
+def arm(**options):
+    """Three links with damping, a spring, friction, a stop and an armature."""
+    builder = lw.ModelBuilder("arm", **options)
+    builder.add_link("base")
+    builder.add_link("upper", mass=4.0, com=(0.1, 0.02, -0.3), inertia=np.diag([0.2, 0.3, 0.1]))
+    builder.add_link("fore", mass=2.0, com=(0.0, 0.05, -0.2), inertia=np.diag([0.1, 0.12, 0.05]))
+    builder.add_link("hand", mass=1.0, com=(0.05, 0.0, -0.1), inertia=np.diag([0.02, 0.02, 0.01]))
+    builder.add_joint("shoulder", "revolute", "base", "upper", axis=(0, 1, 0), damping=0.4)
+    builder.add_joint(
+        "elbow",
+        "revolute",
+        "upper",
+        "fore",
+        axis=(1, 0, 0),
+        translation=(0, 0, -0.6),
+        stiffness=8.0,
+        armature=0.05,
+    )
+    builder.add_joint(
+        "wrist",
+        "revolute",
+        "fore",
+        "hand",
+        axis=(0, 0.6, 0.8),
+        translation=(0, 0.1, -0.4),
+        friction=0.1,
+        lower=-0.2,
+        upper=0.2,
+        limit_stiffness=50.0,
+    )
+    return builder.build()
+
+
+def profile(end, duration, rows=201):
+    """A smooth motion from zero to `end`, as a table."""
+    times = np.linspace(0, duration, rows)
+    phase = 2 * np.pi * times / duration
+    return lw.Table(times, end * (times / duration - np.sin(phase) / (2 * np.pi)), "cubic")

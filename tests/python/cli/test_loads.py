@@ -1,0 +1,160 @@
+"""`linkwise loads` and `linkwise sweep`: tables, files, and one line for what is wrong."""
+
+import csv
+import re
+
+import numpy as np
+import pytest
+
+import linkwise as lw
+
+MOTION = """[drive.elbow]
+kind = "motion"
+table = "elbow.csv"
+[rating.elbow]
+radial = "0.1 kN"
+torque = 2
+[simulate]"""
+
+
+@pytest.fixture
+def scene(scenario, tmp_path):
+    times = np.linspace(0, 0.5, 51)
+    phase = 4 * np.pi * times
+    positions = 0.3 + 0.5 * (phase - np.sin(phase)) / (2 * np.pi)
+    rows = [f"{t:.12g},{q:.15g}" for t, q in zip(times, positions, strict=True)]
+    (tmp_path / "elbow.csv").write_text("time,elbow\n" + "\n".join(rows) + "\n")
+    return scenario(("[simulate]", MOTION))
+
+
+@pytest.fixture
+def run(linkwise, scene):
+    assert linkwise("run", scene, "-o", "run.zarr").code == 0
+    return "run.zarr"
+
+
+def test_table(linkwise, run):
+    result = linkwise("loads", run)
+    assert result.code == 0
+    assert "elbow" in result.out
+    assert "axial [N]" in result.out
+    assert "Against the ratings" in result.out
+    assert "±" not in result.out
+
+
+def test_json_is_the_summary(linkwise, run):
+    found = linkwise("loads", run, "--json", "--split", "force").json
+    summary = lw.loads.summary(lw.open_run(run))
+    peaks = {(r["joint"], r["quantity"]): r for r in found["peaks"]}
+    for (joint, quantity), record in peaks.items():
+        row = summary.sel(joint=joint, quantity=quantity)
+        assert record["peak"] == float(row.peak)
+        assert record["peak_time"] == float(row.peak_time)
+        np.testing.assert_array_equal([record[c] for c in row.component.values], row.wrench)
+    radial = peaks["elbow", "radial"]
+    assert radial["margin"] == pytest.approx(100 / radial["peak"] - 1)
+    for share in found["split"]:
+        fixed = ("joint", "quantity", "unit", "time", "peak")
+        assert share["peak"] == pytest.approx(sum(v for k, v in share.items() if k not in fixed))
+
+
+def test_one_joint_in_full_and_csv(linkwise, run):
+    result = linkwise("loads", run, "-j", "elbow", "--csv", "peaks.csv")
+    assert "Load of elbow" in result.out
+    assert "slide" not in result.out
+    with open("peaks.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["joint"] for row in rows} == {"elbow"}
+    summary = lw.loads.summary(lw.open_run(run))
+    for row in rows:
+        at = summary.sel(joint="elbow", quantity=row["quantity"])
+        assert float(row["peak"]) == float(at.peak)
+
+
+def test_certified_peaks_have_bounds(linkwise, run, scene):
+    result = linkwise("loads", run, "--certify", scene)
+    assert result.code == 0
+    assert "±" in result.out
+    peaks = linkwise("loads", run, "--certify", scene, "--json").json["peaks"]
+    assert all(0 <= r["plus_minus"] < 1e-2 * (1 + abs(r["peak"])) for r in peaks)
+    other = scene.with_name("other.toml")
+    other.write_text(scene.read_text() + "\n# another\n")
+    complaint = linkwise("loads", run, "--certify", other).complaint
+    assert "is not the scenario that made the run" in complaint
+
+
+def test_report(linkwise, run):
+    pytest.importorskip("plotly")
+    assert linkwise("loads", run, "--html", "report.html").code == 0
+    with open("report.html", encoding="utf-8") as file:
+        text = file.read()
+    assert len(text) < 10e6
+    assert "default-src 'none'" in text
+    ours = text.replace(re.search(r"<script>/\*\*?.*?</script>", text, re.DOTALL)[0], "")
+    assert "http" not in ours.replace("http-equiv", "")
+    assert "[red]slider[/red]" not in ours.split("<body>")[1].split("Scenario")[0]
+    for title in ("Peaks", "Against the ratings", "Envelopes", "Over time", "Energy and solver"):
+        assert title in ours
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["nothing.zarr"], "does not exist"),
+        (["run.zarr", "-j", "elbo"], "did you mean 'elbow'"),
+        (["run.zarr", "--split", "sorts"], "--split: 'sorts' is unknown; use force or motion"),
+        (["run.zarr", "--csv", "no/where.csv"], "cannot write it"),
+        (["run.zarr", "--ratings", "bad.toml"], "bad.toml: rating.elbow.radal: unknown key"),
+        (["run.zarr", "--ratings", "joint.toml"], "run holds no such joint; did you mean 'elbow'"),
+        (["arm.urdf"], "is not a linkwise run"),
+    ],
+)
+def test_wrong_input(linkwise, run, tmp_path, arguments, complaint):
+    (tmp_path / "bad.toml").write_text("[rating.elbow]\nradal = 3\n")
+    (tmp_path / "joint.toml").write_text("[rating.elbw]\nradial = 3\n")
+    result = linkwise("loads", *arguments)
+    assert result.code == 2
+    assert complaint in result.complaint
+
+
+def test_sweep(linkwise, scene):
+    axes = ["-s", "payload.box.mass=[0.5, 2]", "-s", "payload.box.link=['upper']"]
+    found = linkwise("sweep", scene, *axes, "-o", "all.nc", "--processes", "1", "--json")
+    assert found.code == 0
+    members = found.json["members"]
+    assert [m["payload.box.mass"] for m in members] == [0.5, 2.0]
+    for member in members:
+        assert member["outcome"] == "converged"
+    assert members[1]["largest_force"] > members[0]["largest_force"]
+    import xarray as xr
+
+    with xr.open_dataset("all.nc", engine="h5netcdf") as stored:
+        assert stored.joint_load.dims[0] == "member"
+        assert stored.sizes["member"] == 2
+        assert np.isfinite(stored.joint_load).all()
+
+
+def test_sweep_members_are_runs_of_their_own(scene, tmp_path):
+    found = lw.sweep(scene, {"payload.box": [{"link": "upper", "mass": 1.0}]}, processes=1)
+    text = scene.read_text() + "\n[payload.box]\nlink = 'upper'\nmass = 1.0\n"
+    alone = tmp_path / "alone.toml"
+    alone.write_text(text)
+    run = lw.run_scenario(alone)
+    np.testing.assert_array_equal(found.joint_load.isel(member=0), run.joint_load)
+
+
+@pytest.mark.parametrize(
+    ("axis", "complaint"),
+    [
+        ("payload.box.mass=3", "is no axis of a sweep"),
+        ("simulate.tolerance=[]", "is no axis of a sweep"),
+        ("simulate.tolerance=[-1]", "simulate.tolerance"),
+        ("simulate.tolerence=[1e-6]", "unknown key; did you mean 'tolerance'"),
+        ("initial.position.elbo=[1]", "did you mean 'elbow'"),
+        ("a b=[1]", "is not a key"),
+    ],
+)
+def test_wrong_sweeps(linkwise, scene, axis, complaint):
+    result = linkwise("sweep", scene, "-s", axis, "--processes", "1")
+    assert result.code == 2
+    assert complaint in result.complaint

@@ -1,0 +1,59 @@
+"""The plus-minus beside every peak holds against much tighter runs, on ten scenes."""
+
+import numpy as np
+import pytest
+
+import linkwise as lw
+from helpers.bound_scenes import SCENES, coverage
+from helpers.loaded_arm import arm
+from helpers.random_trees import random_configuration
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_bounds_hold(scene):
+    covered, total, _ = coverage(scene)
+    assert total >= 6
+    assert covered == total
+
+
+def test_the_algebraic_bound_sees_an_early_stop(rng):
+    """An iteration that stops far too early errs by as much as the bound says, and no less."""
+    model = lw.scenes.chain(12, joint="spherical")
+    options = {"duration": 0.2, "every": 0.02, "method": "constraint_force"}
+    options |= {"q0": random_configuration(model, rng), "tolerance": 1e-3}
+    loose = lw.simulate(model, solver="conjugate_gradient", solver_tolerance=1e-4, **options)
+    q, v = loose.position.values, loose.velocity.values
+    exact = lw.joint_loads(model, q, v, np.zeros(model.nv))
+    error = np.linalg.norm((loose.joint_load.values - exact)[..., :3], axis=-1).max(axis=0)
+    said = lw.loads.bounds(loose).algebraic.sel(quantity="force").values
+    sizes = (np.linalg.norm(x[..., :3], axis=-1) for x in (loose.joint_load.values, exact))
+    size = np.abs(np.subtract(*sizes)).max(axis=0)
+    assert error.max() > 1e-9
+    assert (said >= size * (1 - 1e-6)).all()
+    assert (said <= error + 1e-9).all()
+
+
+def test_without_a_tighter_run_the_integration_is_not_known(swing):
+    found = lw.loads.bounds(swing)
+    assert np.isnan(found.integration).all()
+    assert np.isnan(found.plus_minus).all()
+    assert (found.algebraic.max() < 1e-9).item()
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"tolerance": 1e-7}, "tolerance 1e-07, the run 1e-07; simulate it with 1e-09"),
+        ({"every": 0.1}, "other samples or joints"),
+        ({"drives": {"elbow": 2.0}}, "another drives"),
+        ({"model": lw.scenes.srms()}, "other samples or joints"),
+    ],
+)
+def test_a_run_that_is_no_tighter_one_is_refused(change, complaint):
+    options = {"duration": 0.2, "every": 0.05, "drives": {"elbow": 1.0}}
+    run = lw.simulate(arm(), **options, tolerance=1e-7)
+    options |= {"tolerance": 1e-9, "model": arm(), **change}
+    if "model" in change:
+        options["drives"] = None
+    with pytest.raises(lw.InputError, match=complaint):
+        lw.loads.bounds(run, lw.simulate(**options))
