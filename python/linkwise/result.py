@@ -102,7 +102,9 @@ class Run:
             dims = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
             lines.append(f"  {name!s:<18} ({dims})  {variable.attrs.get('units', '')}")
         if "method" in attrs:
-            lines.append(f"  computed by {attrs['method']}, {attrs.get('solver', '')}")
+            solver = attrs.get("solver", "none")
+            by = attrs["method"] if solver == "none" else f"{attrs['method']} with {solver}"
+            lines.append(f"  computed by {by}")
         if self.path is not None:
             lines.append(f"  stored in   {self.path}")
         return lines

@@ -34,7 +34,7 @@ COMPONENTS = ("fx", "fy", "fz", "nx", "ny", "nz")
 
 _LOAD_ATTRS = {
     "long_name": "joint load",
-    "units": "N (fx, fy, fz), N m (nx, ny, nz)",
+    "units": "N, N m",
     "frame": "joint frame, fixed in the outboard body",
     "point": "joint point: the origin of the joint frame",
     "convention": "wrench that the inboard body exerts on the outboard body through the joint",
