@@ -14,7 +14,7 @@ pytest.importorskip("viser", reason="the view needs viser: pip install '.[view]'
 imageio = pytest.importorskip("imageio.v3")
 
 pytestmark = pytest.mark.browser
-PATIENCE = 90  # seconds; without a GPU a frame can take one
+PATIENCE = 180  # seconds; without a GPU a frame can take one
 WINDOW = {"width": 900, "height": 560}
 SCENE = {"x": 0, "y": 190, "width": 510, "height": 300}  # beside the panel, below messages
 MACHINE_TONE = 0.80  # of white: the grid is lighter, what belongs to the machine darker
@@ -124,7 +124,7 @@ def test_run_plays_scrubs_and_toggles(serve, run_path, page):
 
 def test_load_of_the_chosen_joint_is_plotted(serve, run_path, page):
     page.goto(serve(open_source(run_path, Options())))
-    still(page)
+    page.get_by_text("t = 0 s").wait_for()
     assert page.locator(".uplot").count() == 2
     page.get_by_role("slider").first.press("End")
     wait_for_time(page, lambda now: now == 2)
