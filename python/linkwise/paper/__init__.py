@@ -71,7 +71,7 @@ def reproduce(
         },
         "table2": table2.table2(advance),
         "fig2": (fig2 := chains.fig2(quick, seed, advance)),
-        "fig3": chains.fig3(fig2, quick, seed, advance),
+        "fig3": chains.fig3(fig2, seed, advance),
         "warm_start": guesses.warm_start(advance),
         "stop_tests": guesses.stop_tests(advance),
         "tolerance_ratios": guesses.tolerance_ratios(advance),

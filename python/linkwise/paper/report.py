@@ -128,6 +128,26 @@ def _table2_ours(results: Mapping[str, Any]) -> str:
     return _table(heads, rows)
 
 
+def _end_point(results: Mapping[str, Any]) -> str:
+    """How far the methods end from the known end point, in units of the tolerance."""
+
+    def span(protocol: str, kinds: Sequence[str]) -> str:
+        found = [
+            row["weighted_final_error"]
+            for row in results["table2"]
+            if row["protocol"] == protocol and row["kind"] in kinds
+        ]
+        return f"{min(found):.1f} to {max(found):.1f}"
+
+    return (
+        "<p>Distance from the known end point in the norm of the integrator's error test, in units "
+        f"of TOL, over both maneuvers: direct solvers {span('paper', ['direct'])}; iterative ones "
+        f"{span('paper', ['iterative'])} under the paper's protocol, "
+        f"{span('ours', ['iterative'])} under ours, {span('tight', ['iterative'])} under ours with "
+        "eps = TOL/1000.</p>"
+    )
+
+
 def _fig2(record: Mapping[str, Any]) -> str:
     n = record["bodies"]
     fitted = [record["time_factor"] * x ** record["time_exponent"] * 1e6 for x in n]
@@ -347,6 +367,7 @@ def render(results: Mapping[str, Any]) -> str:
         "<h2>Table 2: our guess and stop test</h2>",
         _table2_ours(results),
         _OURS_NOTE,
+        _end_point(results),
         "<h2>Figure 2: cost against the number of bodies</h2>",
         _FIG2_NOTE,
         *(_fig2(record) for record in results["fig2"]),

@@ -6,7 +6,14 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from linkwise import _core, scenes
-from linkwise.paper.arm import MANEUVERS, OUR_PROTOCOL, PAPER_PROTOCOL, Protocol, run_maneuver
+from linkwise.paper.arm import (
+    MANEUVERS,
+    OUR_PROTOCOL,
+    PAPER_PROTOCOL,
+    TIGHT_PROTOCOL,
+    Protocol,
+    run_maneuver,
+)
 from linkwise.paper.published import STAND_IN_MEAN_ITERATIONS, TABLE_2
 
 # Runs shorter than this are repeated for a better time.
@@ -23,9 +30,10 @@ def contestants() -> Iterator[tuple[str, str, Protocol]]:
     for entry in _core.methods():
         if entry["name"] != "constraint_force" and _takes_the_arm(entry["name"]):
             yield entry["name"], "auto", PAPER_PROTOCOL
-    for name in paper_first:
-        if solvers[name]["kind"] == "iterative":
-            yield "constraint_force", name, OUR_PROTOCOL
+    for protocol in (OUR_PROTOCOL, TIGHT_PROTOCOL):
+        for name in paper_first:
+            if solvers[name]["kind"] == "iterative":
+                yield "constraint_force", name, protocol
 
 
 def _takes_the_arm(method: str) -> bool:
