@@ -8,8 +8,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from linkwise.cli.compare import compare
 from linkwise.cli.bench import bench
+from linkwise.cli.compare import compare
 from linkwise.cli.demo import demo
 from linkwise.cli.inspect import inspect
 from linkwise.cli.loads import loads
@@ -28,8 +28,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command()(compare)
 app.command()(bench)
+app.command()(compare)
 app.command()(demo)
 app.command()(inspect)
 app.command()(loads)
