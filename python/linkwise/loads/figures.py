@@ -226,5 +226,6 @@ def energy_figure(run: Run, every: int, model: Model | None) -> list[Figure]:
 def _steps(run: Run, times: Any, every: int) -> Figure:
     layout = _layout("Integration step", "time [s]", "step [s]")
     layout["yaxis"]["type"] = "log"
-    line = _line("step", times, np.maximum(run.dataset["step_size"].values[::every], 1e-30))
+    steps = run.dataset["step_size"].values[::every]
+    line = _line("step", times, np.where(steps > 0, steps, np.nan))  # none before the first
     return {"data": [line], "layout": layout}
