@@ -1,6 +1,7 @@
 """Shared set-up: the helpers package on the path, one deterministic hypothesis profile."""
 
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -9,6 +10,9 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+# A shell that starts pytest in the background has it ignore Ctrl-C, which the tests of it need.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Deterministic, so that a red run can be repeated; "explore" draws new examples every time.
 settings.register_profile(

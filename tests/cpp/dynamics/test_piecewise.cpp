@@ -18,7 +18,9 @@ Model make_revolute_chain(int n, Axes axes, unsigned seed) {
   std::mt19937 generator(seed);
   std::normal_distribution<double> normal;
   ModelSpec spec;
-  spec.links.push_back({.name = "ground"});
+  LinkSpec ground;
+  ground.name = "ground";
+  spec.links.push_back(ground);
   for (int i = 0; i < n; ++i) {
     LinkSpec link;
     link.name = "link_" + std::to_string(i);
