@@ -8,7 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "kinematics/world_twin.hpp"
+#include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
+#include "linkwise/dynamics/piecewise.hpp"
 #include "model/machines.hpp"
 
 namespace linkwise::testing {
@@ -37,6 +39,21 @@ struct DynamicsCase {
     return in;
   }
 };
+
+/// Does the method take the model? Every method takes every model, but for those named here, which
+/// must say so with an InputError.
+inline bool takes(const DynamicsEntry& entry, const Model& model) {
+  const bool expected = entry.name == "constraint_force" ? model.singular_body() < 0
+                        : entry.name == "piecewise"      ? Piecewise::suits(model)
+                                                         : true;
+  DynamicsOptions options;
+  options.method = entry.name;
+  if (expected)
+    EXPECT_NO_THROW(make_dynamics(model, options)) << entry.name;
+  else
+    EXPECT_THROW(make_dynamics(model, options), InputError) << entry.name;
+  return expected;
+}
 
 struct Motion6 {
   std::vector<double> du, loads;

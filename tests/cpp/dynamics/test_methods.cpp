@@ -10,17 +10,25 @@
 namespace linkwise::testing {
 namespace {
 
-/// Every method; constraint_force with every direct solver and with conjugate gradients, as exact
-/// as they go.
-std::vector<DynamicsOptions> all_options(bool regular) {
+bool branches(const Model& model) {
+  for (int n = 0; n < model.n_bodies(); ++n)
+    if (model.topology[n].n_children > 1) return true;
+  return false;
+}
+
+/// Every method; those with a solver once with each direct solver and with conjugate gradients, as
+/// exact as they go.
+std::vector<DynamicsOptions> all_options(const Model& model) {
   std::vector<DynamicsOptions> all;
   for (const DynamicsEntry& entry : dynamics_table()) {
+    if (!takes(entry, model)) continue;
     DynamicsOptions options;
     options.method = entry.name;
     if (!entry.uses_solver) all.push_back(options);
-    if (!entry.uses_solver || !regular) continue;
+    if (!entry.uses_solver) continue;
     for (const SolverEntry& solver : solver_table()) {
       if (solver.kind != SolverKind::direct && solver.name != "conjugate_gradient") continue;
+      if (solver.chains_only && branches(model)) continue;
       options.solver = solver.name;
       options.solver_options.tolerance = 1e-13;
       options.solver_options.max_iterations = 100000;
@@ -39,7 +47,7 @@ TEST_P(Methods, EqualTheWorldTwin) {
   std::vector<double> du = c.given;
   twin.forward_dynamics(c.state.q, c.state.v, c.tau, c.external, du);
   const WorldTwin::Inverse want = twin.inverse_dynamics(c.state.q, c.state.v, du, c.external);
-  for (const DynamicsOptions& options : all_options(GetParam().regular)) {
+  for (const DynamicsOptions& options : all_options(model)) {
     const std::string name = options.method + " " + options.solver;
     const auto method = make_dynamics(model, options);
     const Motion6 got = evaluate(*method, model, c.input());
@@ -65,7 +73,7 @@ TEST_P(Methods, WhatIsAbsentIsZero) {
   zeros.v = zero.data();
   zeros.prescribed = zero.data();
   zeros.external = no_wrench.data();
-  for (const DynamicsOptions& options : all_options(GetParam().regular)) {
+  for (const DynamicsOptions& options : all_options(model)) {
     const Motion6 a = evaluate(*make_dynamics(model, options), model, absent);
     const Motion6 b = evaluate(*make_dynamics(without_gravity, options), without_gravity, zeros);
     expect_close(a.du, b.du, 1e-12, "accelerations of " + options.method);
@@ -86,6 +94,8 @@ TEST_P(Methods, InverseDynamicsEqualsTheWorldTwin) {
   expect_close(loads, want.loads, 1e-12, "loads");
 }
 
+// The torques of unit accelerations add up along a chain: what is left of them at its tip is known
+// to fewer digits than in the test above.
 TEST_P(Methods, ForwardUndoesInverse) {
   const Model model(GetParam().spec);
   const DynamicsCase c(model, 24);
@@ -94,10 +104,10 @@ TEST_P(Methods, ForwardUndoesInverse) {
   inverse.evaluate(c.input(), c.given.data(), tau.data(), loads.data());
   SweepInput<double> in = c.input();
   in.tau = tau.data();
-  for (const DynamicsOptions& options : all_options(GetParam().regular)) {
+  for (const DynamicsOptions& options : all_options(model)) {
     const Motion6 got = evaluate(*make_dynamics(model, options), model, in);
-    expect_close(got.du, c.given, 1e-10, "accelerations of " + options.method);
-    expect_close(got.loads, loads, 1e-10, "loads of " + options.method);
+    expect_close(got.du, c.given, 1e-9, "accelerations of " + options.method);
+    expect_close(got.loads, loads, 1e-9, "loads of " + options.method);
   }
 }
 

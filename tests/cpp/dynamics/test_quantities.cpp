@@ -80,9 +80,9 @@ TEST_P(Quantities, EnergiesAndMomentaAreSumsOverTheLinks) {
     kinetic += model.dof_values(DofProperty::armature)[i] * state.v[i] * state.v[i] / 2;
   std::vector<double> h(6);
   momentum(model, state.q.data(), state.v.data(), h.data());
-  expect_close(h, {p.x, p.y, p.z, L.x, L.y, L.z}, 1e-13, "momentum");
+  expect_close(h, {p.x, p.y, p.z, L.x, L.y, L.z}, 1e-12, "momentum");
   EXPECT_NEAR(kinetic_energy(model, state.q.data(), state.v.data()), kinetic,
-              1e-13 * (1 + kinetic));
+              1e-12 * (1 + kinetic));
   EXPECT_NEAR(potential_energy(model, state.q.data()), potential,
               1e-12 * (1 + std::abs(potential)));
   EXPECT_NEAR(model.total_mass(), mass, 1e-13 * (1 + mass));

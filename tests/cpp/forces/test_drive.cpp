@@ -87,6 +87,49 @@ TEST(Drives, PlanarPositionControlPullsTowardsItsTarget) {
   EXPECT_NEAR(tau[2], 10 * (0.5 - quarter) + 2, 1e-14);
 }
 
+// Rates and accelerations of a given motion, the planar joint's in the child's axes, by sixth-order
+// differences of its coordinates and rates; from a function and from a table that goes on.
+TEST(GivenMotion, RatesAndAccelerationsBelongToTheCoordinates) {
+  Draws draws(84);
+  const Table cubic{{0, 1}, 3, 3, random_values(12, draws)};
+  Drive table, function;
+  table.kind = function.kind = DriveKind::motion;
+  table.table = cubic;
+  function.motion = [&](double t, double* q, double* v, double* a) {
+    cubic.evaluate(t, q, 0, true);
+    cubic.evaluate(t, v, 1, true);
+    cubic.evaluate(t, a, 2, true);
+  };
+  const auto slope = [](const auto& f) {
+    constexpr double h = 0.01;
+    return (45 * (f(h) - f(-h)) - 9 * (f(2 * h) - f(-2 * h)) + (f(3 * h) - f(-3 * h))) / (60 * h);
+  };
+  for (JointType type : {planar, composite})
+    for (const Drive& drive : {table, function}) {
+      const Model model(tree_spec({type}, {-1}, draws));
+      for (double t : {-0.3, 0.0, 0.6, 1.0, 1.2}) {
+        double q[3], v[3], a[3], rate[3], moved[3][3];
+        evaluate_motion(model.joints[0], drive, t, q, v, a);
+        element_position_rate(model.elements[0], q, v, rate);
+        if (type == composite) std::copy(v, v + 3, rate);
+        for (int i = 0; i < 3; ++i) {
+          EXPECT_NEAR(rate[i], slope([&](double h) {
+                        evaluate_motion(model.joints[0], drive, t + h, moved[0], moved[1],
+                                        moved[2]);
+                        return moved[0][i];
+                      }),
+                      1e-9);
+          EXPECT_NEAR(a[i], slope([&](double h) {
+                        evaluate_motion(model.joints[0], drive, t + h, moved[0], moved[1],
+                                        moved[2]);
+                        return moved[1][i];
+                      }),
+                      1e-9);
+        }
+      }
+    }
+}
+
 TEST(Wrenches, AreTurnedIntoTheirBodiesAndAddUp) {
   const Model model = three_joints();
   Draws draws(83);

@@ -52,6 +52,12 @@ TEST(Table, IsItsPolynomialsInsideAndConstantOutside) {
         table.evaluate(t, out.data(), 1);
         for (int c = 0; c < columns; ++c) EXPECT_EQ(out[c], 0);
       }
+      for (double t : {-2.5, -1.001, 3.001, 4.5})  // extended: the outer polynomials go on
+        for (int derivative : {0, 1, 2}) {
+          table.evaluate(t, out.data(), derivative, true);
+          for (int c = 0; c < columns; ++c)
+            EXPECT_NEAR(out[c], direct(table, t < 0 ? 0 : 2, c, t, derivative), 1e-12) << t;
+        }
     }
 }
 

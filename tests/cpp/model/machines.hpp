@@ -206,6 +206,11 @@ inline std::vector<Machine> all_machines() {
       spec.keep_fixed = true;
       all.push_back({std::string(joint_type_name(type)) + "_" + std::to_string(n), spec});
     }
+  {
+    Draws draws(seed++);
+    all.push_back(
+        {"revolute_40", tree_spec(std::vector(40, JointType::revolute), chain_parents(40), draws)});
+  }
   const std::set<int> sizes{
       1, 2, 3, 7, std::max(1, native_lanes - 1), native_lanes, native_lanes + 1};
   for (int n : sizes)

@@ -1,9 +1,14 @@
 #pragma once
 // Runs a simulation and keeps everything that it can write.
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
+#include <ostream>
+#include <string>
 #include <vector>
 
+#include "dynamics/dynamics_case.hpp"
 #include "linkwise/simulate/simulation.hpp"
 #include "model/machines.hpp"
 
@@ -24,7 +29,7 @@ inline SimulationOptions fixed_step(double step,
 }
 
 struct Instant {
-  std::vector<double> q, v, du, loads, drive_torque;
+  std::vector<double> q, v, du, loads, drive_torque, external;
   double kinetic = 0, potential = 0;
   double energy() const { return kinetic + potential; }
 };
@@ -37,8 +42,17 @@ inline bool advance(Simulation& simulation, double t, Instant& at) {
   at.du.resize(m.nv());
   at.loads.resize(6 * m.n_joints());
   at.drive_torque.resize(m.nv());
-  return simulation.advance(t, {at.q.data(), at.v.data(), at.du.data(), at.loads.data(),
-                                at.drive_torque.data(), &at.kinetic, &at.potential});
+  at.external.resize(6 * m.n_joints());
+  Sample sample;
+  sample.position = at.q.data();
+  sample.velocity = at.v.data();
+  sample.acceleration = at.du.data();
+  sample.joint_load = at.loads.data();
+  sample.drive_torque = at.drive_torque.data();
+  sample.external = at.external.data();
+  sample.kinetic_energy = &at.kinetic;
+  sample.potential_energy = &at.potential;
+  return simulation.advance(t, sample);
 }
 
 inline std::vector<Instant> run(Simulation& simulation, const std::vector<double>& times) {
@@ -55,6 +69,58 @@ inline std::vector<double> every(double step, double end) {
   std::vector<double> times;
   for (int i = 0; i * step <= end * (1 + 1e-12); ++i) times.push_back(i * step);
   return times;
+}
+
+inline double distance(const std::vector<double>& a, const std::vector<double>& b) {
+  double worst = 0;
+  for (size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(a[i] - b[i]));
+  return worst;
+}
+
+inline std::vector<IntegratorKind> all_kinds() {
+  std::vector<IntegratorKind> kinds;
+  for (const IntegratorEntry& entry : integrator_registry()) kinds.push_back(entry.kind);
+  return kinds;
+}
+
+/// Every method with the joint rates as state, and the bodies' own velocities as state.
+struct Formulation {
+  std::string method;
+  StateChoice state;
+};
+inline std::vector<Formulation> formulations(const Model& model) {
+  std::vector<Formulation> all{{"constraint_force", StateChoice::body_velocities}};
+  for (const DynamicsEntry& entry : dynamics_table())
+    if (takes(entry, model)) all.push_back({std::string(entry.name), StateChoice::joint_rates});
+  return all;
+}
+inline void PrintTo(const Formulation& f, std::ostream* out) {
+  *out << f.method << (f.state == StateChoice::body_velocities ? ", body velocities" : "");
+}
+inline SimulationOptions with(SimulationOptions options, const Formulation& f) {
+  options.dynamics.method = f.method;
+  options.state = f.state;
+  return options;
+}
+
+/// Every kind of coordinate in one tree, no forces but gravity.
+inline ModelSpec every_kind(std::uint64_t seed = 101) {
+  using enum JointType;
+  Draws draws(seed);
+  return tree_spec({revolute, spherical, planar, composite, revolute}, {-1, 0, 0, 1, 1}, draws);
+}
+
+/// A particle of 1 kg on a massless rod of 1 m: q'' = -9.81 sin q.
+inline ModelSpec pendulum() {
+  ModelSpec spec;
+  spec.links = {{"base", 0, {}, {}}, {"bob", 1, {0, 0, -1}, {}}};
+  JointSpec hinge;
+  hinge.name = "hinge";
+  hinge.parent = "base";
+  hinge.child = "bob";
+  hinge.axes = {{AxisKind::revolute, {0, 1, 0}, 0}};
+  spec.joints = {hinge};
+  return spec;
 }
 
 }  // namespace linkwise::testing

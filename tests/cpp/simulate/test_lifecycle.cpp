@@ -22,7 +22,7 @@ TEST(Lifecycle, Models) {
 
 TEST(Lifecycle, Methods) {
   Draws draws(122);
-  const Model model(stacked_spec(draws));
+  const Model model(tree_spec(std::vector(16, JointType::revolute), chain_parents(16), draws));
   const MachineState state = random_state(model, draws);
   std::vector<double> tau(model.nv()), du(model.nv()), loads(6 * model.n_joints());
   SweepInput<double> in;
@@ -42,7 +42,7 @@ TEST(Lifecycle, Methods) {
 
 TEST(Lifecycle, SolversByWayOfTheirTable) {
   Draws draws(123);
-  const Model model(stacked_spec(draws));
+  const Model model(tree_spec(std::vector(3, JointType::universal), chain_parents(3), draws));
   for (int i = 0; i < cycles; ++i)
     for (const SolverEntry& entry : solver_table()) {
       DynamicsOptions options;
