@@ -52,6 +52,7 @@ struct Reader {
   }
   void take(void* out, size_t n) {
     if (n > bytes.size() - at) fail("cut short");
+    if (n == 0) return;  // `out` may be null: an empty vector's
     std::memcpy(out, bytes.data() + at, n);
     at += n;
   }
