@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "contestant.hpp"
+#include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/batch.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
 #include "linkwise/model/model.hpp"
@@ -92,7 +93,13 @@ Field make_linkwise(const std::filesystem::path& folder) {
   Field field;
   field.states = shared->states.count;
   const auto enter = [&](const std::string& name, const DynamicsOptions& options) {
+    try {
+      make_dynamics(shared->model, options);
+    } catch (const InputError&) {
+      return;  // a method for other machines than this one
+    }
     field.contestants.push_back(single(shared, name, options));
+    field.contestants.back().threads = options.threads;
   };
   DynamicsOptions plain;
   plain.threads = 1;
@@ -119,7 +126,6 @@ Field make_linkwise(const std::filesystem::path& folder) {
     DynamicsOptions options;
     options.threads = threads;
     enter(std::to_string(threads) + (threads > 1 ? " threads" : " thread"), options);
-    field.contestants.back().threads = threads;
   }
   return field;
 }

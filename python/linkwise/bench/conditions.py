@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import platform
+import shutil
+import subprocess
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -29,7 +31,22 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def conditions(compiled: Compiled, memory: int) -> dict[str, Any]:
+def commit(sources: Path | None) -> str:
+    """The sources' commit, with a + when they differ from it; empty where Git does not tell."""
+    if sources is None or not (sources / ".git").exists() or not shutil.which("git"):
+        return ""
+    told = []
+    for command in (["rev-parse", "--short", "HEAD"], ["status", "--porcelain", "-uno", "src"]):
+        done = subprocess.run(
+            ["git", *command], cwd=sources, capture_output=True, text=True, check=False
+        )
+        if done.returncode != 0:
+            return ""
+        told.append(done.stdout.strip())
+    return told[0] + ("+" if told[1] else "")
+
+
+def conditions(compiled: Compiled, memory: int, sources: Path | None) -> dict[str, Any]:
     installed = {engine.package: engine.version for engine in ENGINES[1:]}
     for package in ("numpy", "scipy", "example-robot-data"):
         try:
@@ -43,6 +60,7 @@ def conditions(compiled: Compiled, memory: int) -> dict[str, Any]:
         "system": f"{platform.system()} {platform.release()}",
         "python": platform.python_version(),
         "linkwise": versions()["linkwise"],
+        "commit": commit(sources),
         "cpu_target": getattr(_core, "cpu_target", None),
         "packages": installed,
         "missing": [e.name for e in ENGINES if not e.installed],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,7 +12,13 @@ from typing import Any
 import numpy as np
 
 from linkwise.bench.engines.table import ENGINES, Engine
-from linkwise.bench.process import Worker, compiled_worker, python_worker
+from linkwise.bench.process import (
+    Worker,
+    WorkerError,
+    compiled_worker,
+    memory_limit,
+    python_worker,
+)
 
 CPP, PYTHON = "C++", "Python"
 
@@ -30,7 +37,7 @@ class Effort:
 
 
 QUICK = Effort(True, rounds=5, turn=0.01, slowest=1, build=5, fewest_rounds=2, patience=0.5)
-FULL = Effort(False, rounds=15, turn=0.05, slowest=30, build=120, fewest_rounds=3, patience=20)
+FULL = Effort(False, rounds=15, turn=0.05, slowest=30, build=60, fewest_rounds=3, patience=20)
 
 
 @dataclass
@@ -43,6 +50,7 @@ class Pits:
     engines: tuple[Engine, ...] = ENGINES
     _workers: dict[tuple[str, str, bool], Worker] = field(default_factory=dict)
     _sizes: dict[tuple[str, str], dict[int, int]] = field(default_factory=dict)
+    _failed: dict[tuple[str, str], int] = field(default_factory=dict)
 
     def arenas(self, engine: Engine) -> list[str]:
         if not engine.installed:
@@ -71,14 +79,10 @@ class Pits:
         power = np.log(m1 / m0) / np.log(n1 / n0)
         return float(m1 * (n / n1) ** min(float(power), 3.0))
 
-    def weigh(self, engine: Engine, arena: str, n: int, worker: Worker) -> None:
-        self._sizes.setdefault((engine.name, arena), {})[n] = int(
-            worker.ask("memory", timeout=5)["peak"]
-        )
-
-    def forget_sizes(self) -> None:
-        """Another family of machines begins."""
+    def begin_family(self) -> None:
+        """Machines of another kind follow: sizes that failed say nothing about them."""
         self._sizes.clear()
+        self._failed.clear()
 
     def close(self) -> None:
         for worker in self._workers.values():
@@ -109,6 +113,8 @@ class Box:
         worker = self.pits.worker(self.engine, self.arena, threads=self.threads)
         worker.ask("clear", timeout=self.pits.effort.build)
         self._before = int(worker.ask("memory", timeout=5)["resident"])
+        # Half of what is free now: those built before keep theirs, and all together never take all.
+        worker.allow(memory_limit())
         start = time.perf_counter()
         answer = worker.ask("build", str(self.folder), timeout=self.pits.effort.build)
         self.build_seconds = time.perf_counter() - start
@@ -126,12 +132,25 @@ class Box:
         assert self._built is not None
         return self._built.ask(*lines, timeout=timeout)
 
+    def clear(self) -> None:
+        """Forgets the machine, so that the next one finds the memory free."""
+        if self._built is not None and self._built.alive:
+            with contextlib.suppress(WorkerError):
+                self._built.ask("clear", timeout=self.pits.effort.build)
+
     def weigh(self, n: int) -> None:
-        assert self._built is not None
-        self.pits.weigh(self.engine, self.arena, n, self._built)
+        """Remembers the memory that n bodies took."""
+        peak = int(self.ask("memory", timeout=5)["peak"]) - self._before
+        self.pits._sizes.setdefault((self.engine.name, self.arena), {})[n] = peak
+
+    def failed(self, n: int) -> None:
+        self.pits._failed.setdefault((self.engine.name, self.arena), n)
 
     def too_big(self, n: int) -> str:
         """Why n bodies are not even tried, or nothing."""
+        lost = self.pits._failed.get((self.engine.name, self.arena), n)
+        if lost < n:
+            return f"not tried: {lost:,} are too many already"
         needed, allowed = self.pits.forecast(self.engine, self.arena, n), self.pits.memory
         if needed <= allowed:
             return ""

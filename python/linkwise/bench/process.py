@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import resource
 import selectors
 import signal
 import subprocess
@@ -47,7 +48,7 @@ class Worker:
     """A process that answers requests of one or several lines with one line of JSON."""
 
     def __init__(self, command: Sequence[str], *, memory: int, threads: bool = False) -> None:
-        self.memory = memory
+        self.memory = self._most = memory
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `close`)
         self._buffer = b""
         environment = dict(os.environ) if threads else {**os.environ, **_ONE_THREAD}
@@ -58,6 +59,13 @@ class Worker:
             stderr=self._errors,
             env=environment,
         )
+
+    def allow(self, memory: int) -> None:
+        """Less or again more memory than at its start, but never more than that."""
+        self.memory = min(memory, self._most)
+        if hasattr(resource, "prlimit") and self.alive:
+            limits = (self.memory, self._most)
+            resource.prlimit(self._process.pid, resource.RLIMIT_DATA, limits)
 
     @property
     def alive(self) -> bool:
@@ -83,6 +91,7 @@ class Worker:
             text = str(answer["error"])
             if text == "out of memory":
                 text = f"needs more than {self.memory / _GIB:.1f} GiB of memory"
+                self.close()  # and gives back what it has
             raise WorkerError(text)
         return answer
 

@@ -64,6 +64,7 @@ def race(
         folder = Path(name)
         drawn = random_states(machine, states)
         write_case(machine, drawn, folder)
+        boxes: list[Box] = []
         entries: list[Entry] = []
         for engine in pits.engines:
             if engine.name != "linkwise" and not machine.bodies:
@@ -72,11 +73,15 @@ def race(
                 continue
             for arena in (a for a in pits.arenas(engine) if a in arenas):
                 box = Box(pits, engine, arena, folder, threads)
+                boxes.append(box)
                 entries += _enter(case, machine, box, rows, wanted)
         running = list(_that_agree(pits, machine, drawn, entries, folder))
         take_turns(pits.effort, running)
         for entry in running:
-            _weigh(entry)
+            if entry.row.measured and not entry.row.failure:
+                _weigh(entry)
+        for box in boxes:
+            box.clear()
     for row in rows:
         if row.failure:
             pits.say(f"{row.machine}: {row.engine} ({row.arena}) {row.method} {row.failure}")
@@ -101,19 +106,28 @@ def _enter(
         rows.append(Row(case, machine.name, n, box.engine.name, box.arena, method, **more))
         return rows[-1]
 
-    if reason := box.too_big(n):
+    if reason := box.too_big(n) or _unprepared(box, rows):
         row("", failure=reason)
         return
     try:
         built = box.build()
         box.weigh(n)
     except WorkerError as failed:
+        box.failed(n)
         row("", failure=str(failed))
         return
     for offer in (Offer(**described) for described in built["contestants"]):
         if wanted(box.engine.name, box.arena, offer):
             made = row(offer.method, threads=offer.threads, loads=offer.loads)
             yield Entry(made, box, offer.systems, box.threads)
+
+
+def _unprepared(box: Box, rows: list[Row]) -> str:
+    """Why an engine's Python side could not write what its C++ side loads, or nothing."""
+    if box.arena == PYTHON or not box.engine.prepared:
+        return ""
+    mine = (row for row in rows if row.engine == box.engine.name and row.arena == PYTHON)
+    return next((row.failure for row in mine if not row.method), "")
 
 
 def _that_agree(

@@ -74,7 +74,9 @@ def failures(rows: Sequence[Row]) -> str:
     reasons: dict[tuple[str, str], list[str]] = {}
     for row in rows:
         if row.failure:
-            reasons.setdefault((_label(row), row.failure), []).append(row.machine)
+            machines = reasons.setdefault((_label(row), row.failure), [])
+            if row.machine not in machines:
+                machines.append(row.machine)
     return "\n".join(
         f"- {label}: {', '.join(filter(None, machines)) + ': ' if any(machines) else ''}{reason}"
         for (label, reason), machines in reasons.items()
@@ -155,7 +157,7 @@ def _conditions(found: dict[str, Any]) -> str:
     busy = f", load average {load[0]:.1f}" if load else ""
     lines = [
         f"- {found['processor']}, {found['cores']} cores{busy}; {found['system']}",
-        f"- linkwise {found['linkwise']} (CPU target {found['cpu_target']}), "
+        f"- linkwise {found['linkwise']}{_commit(found)} (CPU target {found['cpu_target']}), "
         f"Python {found['python']}, {packages}",
     ]
     lines += [f"- {NAMES[name]}, C++: `{flags}`" for name, flags in found["flags"].items()]
@@ -164,6 +166,10 @@ def _conditions(found: dict[str, Any]) -> str:
     if found["missing"]:
         lines.append("- not installed: " + ", ".join(NAMES[name] for name in found["missing"]))
     return "\n".join(lines)
+
+
+def _commit(found: dict[str, Any]) -> str:
+    return f" at {found['commit']}" if found.get("commit") else ""
 
 
 _TABLES = {"memory": _memory, "threads": _threads, "simulation": _simulation}

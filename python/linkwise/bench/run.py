@@ -12,7 +12,7 @@ from typing import Any
 from linkwise._core import InputError
 from linkwise.bench import plots
 from linkwise.bench.cases.table import BY_NAME, CASES
-from linkwise.bench.compiling import compile_worker
+from linkwise.bench.compiling import compile_worker, find_sources
 from linkwise.bench.conditions import conditions
 from linkwise.bench.pits import FULL, QUICK, Pits
 from linkwise.bench.process import memory_limit
@@ -69,7 +69,7 @@ def run_bench(
     if compiled.reason:
         say(f"no C++ side: {compiled.reason}")
     memory = memory_limit()
-    found = conditions(compiled, memory)
+    found = conditions(compiled, memory, sources or find_sources())
     for name in found["missing"]:
         say(f"{name} is not installed")
     rows: list[Row] = []

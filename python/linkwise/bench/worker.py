@@ -7,6 +7,7 @@ and one more. Time is that of the wall clock and, as "cpu", that of the process'
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import json
 import os
@@ -125,8 +126,11 @@ def memory_use() -> dict[str, Any]:
 
 
 def limit_memory(most: int) -> None:
+    """The system's memory may run out all the same; then it is this process that has to go."""
     import resource
 
+    with contextlib.suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text("1000")
     resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 

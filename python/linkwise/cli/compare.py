@@ -30,7 +30,7 @@ def compare(
     ] = "energy_norm",
     limit: Annotated[
         float, typer.Option(min=0.01, help="Seconds that a solver may take over all states.")
-    ] = 2.0,
+    ] = 0.5,
     seed: Annotated[int, typer.Option(min=0, help="Of the random pose of a model.")] = 0,
     plot: Annotated[
         Path | None,

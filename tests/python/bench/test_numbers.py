@@ -71,7 +71,10 @@ def test_memory_is_forecast_from_the_two_largest_sizes():
     assert pits.forecast(engine, PYTHON, 3000) == pytest.approx(9e9, rel=1e-6)  # quadratic
     assert "would need 8 GiB" in box.too_big(3000)
     assert box.too_big(1000) == ""
-    pits.forget_sizes()
+    box.failed(1000)
+    assert box.too_big(1000) == ""
+    assert box.too_big(2000) == "not tried: 1,000 are too many already"
+    pits.begin_family()
     assert box.too_big(3000) == ""
 
 

@@ -154,7 +154,19 @@ def test_memory_is_bounded(tmp_path):
         worker.ask("build", str(tmp_path), timeout=60)
         with pytest.raises(WorkerError, match=r"needs more than 0\.1 GiB of memory"):
             worker.ask("time", "batch", "1", timeout=60)
-        assert worker.alive
+        assert not worker.alive  # what it had is free again
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of other processes are Linux's")
+def test_what_is_allowed_can_be_less_than_at_the_start(tmp_path):
+    machine = random_chain(100)
+    write_case(machine, random_states(machine, 4096), tmp_path)
+    with python_worker("linkwise", memory=2**31) as worker:
+        worker.ask("build", str(tmp_path), timeout=60)
+        worker.ask("time", "auto", "1", timeout=60)
+        worker.allow(2**26)
+        with pytest.raises(WorkerError, match=r"needs more than 0\.1 GiB of memory"):
+            worker.ask("time", "batch", "1", timeout=60)
 
 
 def test_a_box_is_built_again_after_its_worker_died(tmp_path):

@@ -27,7 +27,7 @@ def wanted(engine: str, _arena: str, offer: Offer) -> bool:
 
 
 def run(pits: Pits) -> list[Row]:
-    pits.forget_sizes()
+    pits.begin_family()
     rows: list[Row] = []
     for machine in machines():
         pits.say(f"batch: {STATES} states of {machine.name}")

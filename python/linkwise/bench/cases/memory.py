@@ -21,7 +21,7 @@ def wanted(engine: str, _arena: str, offer: Offer) -> bool:
 
 
 def run(pits: Pits) -> list[Row]:
-    pits.forget_sizes()
+    pits.begin_family()
     rows: list[Row] = []
     for n in QUICK_SIZES if pits.effort.quick else SIZES:
         pits.say(f"memory: chain of {n}")

@@ -10,9 +10,9 @@ from linkwise.bench.rows import Row
 
 
 def run(pits: Pits) -> list[Row]:
-    pits.forget_sizes()
     rows: list[Row] = []
     for robot in ROBOTS:
+        pits.begin_family()
         pits.say(f"robots: {robot.name}")
         try:
             machine = load_robot(robot)

@@ -19,7 +19,7 @@ def wanted(engine: str, arena: str, offer: Offer) -> bool:
 
 
 def run(pits: Pits) -> list[Row]:
-    pits.forget_sizes()
+    pits.begin_family()
     rows: list[Row] = []
     for n in QUICK_SIZES if pits.effort.quick else SIZES:
         pits.say(f"single: chain of {n}")

@@ -15,7 +15,7 @@ class Engine:
     name: str
     module: str  # that must be importable
     package: str  # that pip installs
-    compiled: bool = False  # whether the C++ worker knows it
+    prepared: bool = False  # whether its C++ side loads what its Python side writes
 
     @property
     def installed(self) -> bool:
@@ -34,11 +34,10 @@ class Engine:
         return built
 
 
-#: MuJoCo's C++ worker loads the model that its Python worker compiles and saves.
 ENGINES = (
-    Engine("linkwise", "linkwise", "linkwise", compiled=True),
-    Engine("pinocchio", "pinocchio", "pin", compiled=True),
-    Engine("mujoco", "mujoco", "mujoco", compiled=True),
+    Engine("linkwise", "linkwise", "linkwise"),
+    Engine("pinocchio", "pinocchio", "pin"),
+    Engine("mujoco", "mujoco", "mujoco", prepared=True),
     Engine("dart", "dartpy", "dartpy"),
     Engine("drake", "pydrake", "drake"),
 )
