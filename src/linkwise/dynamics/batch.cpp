@@ -1,0 +1,135 @@
+#include "linkwise/dynamics/batch.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "linkwise/dynamics/articulated_body.hpp"
+#include "linkwise/dynamics/inverse_dynamics.hpp"
+
+namespace linkwise {
+
+struct BatchEvaluator::Work {
+  explicit Work(const Model& model) : model_(&model) {}
+
+  int forward_dynamics(size_t count, const BatchInput& in, double* du, double* loads) {
+    int failed = -1;
+    over_groups(
+        count, in,
+        [&](const SweepInput<double>& one, size_t i) {
+          auto& kernel = made(forward_);
+          if (!kernel.evaluate(one, du + i * nv(), loads ? loads + i * n_load() : nullptr))
+            failed = kernel.failed_body();
+        },
+        [&](const SweepInput<Group>& group, size_t i) {
+          auto& kernel = made(forward_lanes_);
+          if (!kernel.evaluate(group, out_a(), loads ? out_b() : nullptr))
+            failed = kernel.failed_body();
+          unpack(out_a(), nv(), i, count, du);
+          if (loads) unpack(out_b(), n_load(), i, count, loads);
+        });
+    return failed;
+  }
+
+  void inverse_dynamics(size_t count, const BatchInput& in, double* tau, double* loads) {
+    over_groups(
+        count, in,
+        [&](const SweepInput<double>& one, size_t i) {
+          made(inverse_).evaluate(one, one.prescribed, tau ? tau + i * nv() : nullptr,
+                                  loads ? loads + i * n_load() : nullptr);
+        },
+        [&](const SweepInput<Group>& group, size_t i) {
+          made(inverse_lanes_)
+              .evaluate(group, group.prescribed, tau ? out_a() : nullptr,
+                        loads ? out_b() : nullptr);
+          if (tau) unpack(out_a(), nv(), i, count, tau);
+          if (loads) unpack(out_b(), n_load(), i, count, loads);
+        });
+  }
+
+ private:
+  using Group = Lanes<native_lanes>;
+
+  size_t nq() const { return model_->nq(); }
+  size_t nv() const { return model_->nv(); }
+  size_t n_load() const { return 6 * static_cast<size_t>(model_->n_joints()); }
+
+  template <class Kernel>
+  Kernel& made(std::unique_ptr<Kernel>& kernel) {
+    if (!kernel) kernel = std::make_unique<Kernel>(*model_);
+    return *kernel;
+  }
+
+  Group* out_a() {
+    out_a_.resize(nv());
+    return out_a_.data();
+  }
+  Group* out_b() {
+    out_b_.resize(n_load());
+    return out_b_.data();
+  }
+
+  /// Systems i ... i + lanes - 1 of rows of length n; the last one stands in beyond the end.
+  const Group* pack(std::vector<Group>& to, const double* from, size_t n, size_t i, size_t count) {
+    if (!from) return nullptr;
+    to.resize(n);
+    const double* rows[native_lanes];
+    for (int l = 0; l < native_lanes; ++l) rows[l] = from + std::min(i + l, count - 1) * n;
+    for (size_t k = 0; k < n; ++k)
+      for (int l = 0; l < native_lanes; ++l) to[k][l] = rows[l][k];
+    return to.data();
+  }
+  void unpack(const Group* from, size_t n, size_t i, size_t count, double* to) {
+    const int lanes = static_cast<int>(std::min<size_t>(native_lanes, count - i));
+    for (int l = 0; l < lanes; ++l)
+      for (size_t k = 0; k < n; ++k) to[(i + l) * n + k] = from[k][l];
+  }
+
+  template <class One, class Several>
+  void over_groups(size_t count, const BatchInput& in, One&& one, Several&& several) {
+    size_t i = 0;
+    while (i < count) {
+      if (count - i == 1) {
+        SweepInput<double> s;
+        s.q = in.q + i * nq();
+        s.v = in.v ? in.v + i * nv() : nullptr;
+        s.tau = in.tau ? in.tau + i * nv() : nullptr;
+        s.prescribed = in.du ? in.du + i * nv() : nullptr;
+        s.external = in.external ? in.external + i * n_load() : nullptr;
+        s.gravity_factor = in.gravity_factor;
+        one(s, i);
+        return;
+      }
+      SweepInput<Group> s;
+      s.q = pack(q_, in.q, nq(), i, count);
+      s.v = pack(v_, in.v, nv(), i, count);
+      s.tau = pack(tau_, in.tau, nv(), i, count);
+      s.prescribed = pack(du_, in.du, nv(), i, count);
+      s.external = pack(external_, in.external, n_load(), i, count);
+      s.gravity_factor = in.gravity_factor;
+      several(s, i);
+      i += native_lanes;
+    }
+  }
+
+  const Model* model_;
+  std::unique_ptr<ArticulatedBody<double>> forward_;
+  std::unique_ptr<ArticulatedBody<Group>> forward_lanes_;
+  std::unique_ptr<InverseDynamics<double>> inverse_;
+  std::unique_ptr<InverseDynamics<Group>> inverse_lanes_;
+  std::vector<Group> q_, v_, tau_, du_, external_, out_a_, out_b_;
+};
+
+BatchEvaluator::BatchEvaluator(const Model& model) : work_(std::make_unique<Work>(model)) {}
+BatchEvaluator::~BatchEvaluator() = default;
+
+int BatchEvaluator::forward_dynamics(size_t count, const BatchInput& in, double* du,
+                                     double* loads) {
+  return work_->forward_dynamics(count, in, du, loads);
+}
+
+void BatchEvaluator::inverse_dynamics(size_t count, const BatchInput& in, double* tau,
+                                      double* loads) {
+  work_->inverse_dynamics(count, in, tau, loads);
+}
+
+}  // namespace linkwise
