@@ -118,6 +118,7 @@ __all__ = [
     "stop_rules",
     "sweep",
 ]
+__version__: str
 
 if TYPE_CHECKING:
     from linkwise import drives, loads, scenes
@@ -166,6 +167,8 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(_PUBLIC[name]), name)
     elif name in _SUBMODULES:
         value = import_module(f"linkwise.{name}")
+    elif name == "__version__":
+        value = import_module("linkwise.record.provenance").versions()["linkwise"]
     else:
         raise AttributeError(f"module 'linkwise' has no attribute {name!r}")
     globals()[name] = value

@@ -166,7 +166,7 @@ class Run:
             data[name] = ("joint", largest[k], attrs)
             at_attrs = {"long_name": f"time of the largest joint {name}", "units": "s"}
             data[f"{name}_time"] = ("joint", when[k], at_attrs)
-        return xr.Dataset(data, coords={"joint": load["joint"]}, attrs={})
+        return xr.Dataset(data, coords={"joint": ("joint", load["joint"].values)})
 
     def to_netcdf(self, path: str | os.PathLike[str]) -> Path:
         """Write everything to one NetCDF-4 file (also an HDF5 file); replaces an existing file."""

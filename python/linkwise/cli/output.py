@@ -71,10 +71,12 @@ def table(title: str, columns: Sequence[tuple[str, str]]) -> Table:
     """A plain table; columns are (heading, "left" or "right")."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
+    from rich.text import Text
 
     made = Table(title=title or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for heading, justify in columns:
-        made.add_column(heading, justify=justify, overflow="fold")  # type: ignore[arg-type]
+        # As Text: in a string Rich would take "[s]" for a style.
+        made.add_column(Text(heading), justify=justify, overflow="fold")  # type: ignore[arg-type]
     return made
 
 

@@ -81,7 +81,9 @@ def load(
         )
     if kind == "mujoco":
         from linkwise.io.mjcf import read_mjcf
+        from linkwise.io.mjcf_limits import check_mjcf
 
+        check_mjcf(path, root)
         if floating_base:
             complain(
                 path,

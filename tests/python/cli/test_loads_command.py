@@ -38,6 +38,7 @@ def test_table(linkwise, run):
     assert result.code == 0
     assert "elbow" in result.out
     assert "axial [N]" in result.out
+    assert "at [s]" in result.out
     assert "Against the ratings" in result.out
     assert "±" not in result.out
 

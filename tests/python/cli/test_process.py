@@ -50,10 +50,10 @@ def test_help_does_not_load_the_numerics():
         assert command in done.stdout
 
 
-def test_version():
-    done = subprocess.run([*COMMAND, "--version"], capture_output=True, text=True, check=True)
-    assert done.stdout.split()[0] == "linkwise"
-    assert len(done.stdout.splitlines()) == 1
+@pytest.mark.parametrize("command", [COMMAND, [sys.executable, "-m", "linkwise"]])
+def test_version(command):
+    done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout == f"linkwise {lw.__version__}\n"
 
 
 def test_reader_that_goes_away_is_no_failure(long_scenario):

@@ -239,6 +239,76 @@ def test_defect_is_named(write, complaint, capfd, monkeypatch, tmp_path, text, e
     assert sorted(tmp_path.iterdir()) == [path]
 
 
+LARGE = [
+    ('<include file="other.xml"/>', ":2: element 'include': a file that is included is not read; "),
+    (
+        '<asset><model name="m" file="other.xml"/></asset>',
+        ":2: element 'model': a model in a file of its own is not read; paste the content",
+    ),
+    (
+        '<worldbody><replicate count="1000"><replicate count="1000"><body><geom size="1"/></body>'
+        "</replicate></replicate></worldbody>",
+        ":1: element 'mujoco': has more than 20000 elements once all are replicated; build very ",
+    ),
+    (
+        '<worldbody><flexcomp name="f" type="grid" count="300 300 300"/></worldbody>',
+        ":1: element 'mujoco': has more than 20000 elements",
+    ),
+    (
+        '<asset><texture name="t" type="2d" builtin="flat" width="90000" height="90000"/></asset>',
+        ":2: element 'texture': brings what the file orders by counts to more than 134217728 ",
+    ),
+    (
+        '<default><texture width="20000" height="2"/></default><asset><texture builtin="flat"/>'
+        "</asset>",
+        ":2: element 'texture': brings what the file orders",
+    ),
+    (
+        '<asset><hfield name="h" nrow="100000" ncol="100000" size="1 1 1 1"/></asset>',
+        ":2: element 'hfield': brings what the file orders",
+    ),
+    (
+        '<custom><numeric name="n" size="2000000000"/></custom>',
+        ":2: element 'numeric': brings what the file orders",
+    ),
+    ('<size nuser_body="100000000"/>', ":2: element 'size': nuser_body is larger than 1000; leave"),
+    (
+        '<asset><mesh name="m" file="/dev/zero"/></asset>',
+        ":2: element 'mesh': file '/dev/zero' is not a regular file; give a file",
+    ),
+    (
+        '<asset><texture name="t" type="2d" file="bomb.png"/></asset>',
+        ":2: element 'texture': brings what the file orders",
+    ),
+    (
+        '<asset><mesh name="m" file="heavy.stl"/></asset>',
+        ":2: element 'mesh': file 'heavy.stl' brings the meshes and pictures to more than 256 MiB",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "expected"), LARGE)
+def test_what_would_read_elsewhere_or_exhaust_the_memory_is_refused(
+    write, complaint, tmp_path, monkeypatch, text, expected
+):
+    def compile_it(path):
+        raise AssertionError("reached MuJoCo's compiler")
+
+    monkeypatch.setattr("linkwise.io.mjcf.compile_mjcf", compile_it)
+    (tmp_path / "other.xml").write_text("<mujoco/>")
+    header = b"\x89PNG\r\n\x1a\n" + bytes([0, 0, 0, 13]) + b"IHDR"
+    (tmp_path / "bomb.png").write_bytes(header + (100_000).to_bytes(4, "big") * 2)
+    with open(tmp_path / "heavy.stl", "wb") as sparse:
+        sparse.truncate(2**29)
+    assert complaint(lw.load, write(f"<mujoco>\n{text}</mujoco>")).startswith(expected)
+
+
+def test_replicated_bodies_within_bounds_are_read(write):
+    ring = '<replicate count="8" euler="0 0 45"><body pos="1 0 0"><joint/><geom size="0.1"/></body>'
+    model = lw.load(write(f"<mujoco><worldbody>{ring}</replicate></worldbody></mujoco>"))
+    assert model.n_joints == 8
+
+
 def test_floating_base_is_the_files_business(write, complaint):
     message = complaint(lw.load, write(MACHINE), floating_base=True)
     assert message.startswith(": floating_base: an MJCF file says itself which bodies float; ")

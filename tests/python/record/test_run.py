@@ -93,6 +93,7 @@ def test_peak_loads(model, monkeypatch, block):
     np.testing.assert_allclose(peaks.force_time, [TIMES[5], 0, 0])
     np.testing.assert_allclose(peaks.moment_time, [TIMES[9], 0, 0])
     assert peaks.joint.values.tolist() == ["shoulder", "elbow", "wrist"]
+    assert list(peaks.coords) == ["joint"]
     assert peaks.force.attrs["units"] == "N"
 
 

@@ -100,9 +100,9 @@ def serve():
         assert not thread.is_alive()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def chromium():
-    """A headless Chromium; where it is missing, what needs it is skipped and says so."""
+    """A headless Chromium; a test is skipped, and says so, where there is none."""
     playwright = pytest.importorskip(
         "playwright.sync_api", reason="browser tests need playwright: pip install '.[test]'"
     )

@@ -1,0 +1,5 @@
+"""`python -m linkwise`: the command line."""
+
+from linkwise.cli import main
+
+main()
