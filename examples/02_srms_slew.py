@@ -1,9 +1,9 @@
-"""The Space Shuttle's arm slews a 100 kg payload: peak load of every joint, and a plot of them.
+"""The Space Shuttle's arm slews a payload of 100 kg: peak load of every joint.
 
-Run it by: python examples/02_srms_slew.py [FIGURE.svg]
+The torques are the inverse dynamics of a known motion and are applied open loop, so the arm must
+end where that motion ends. The same machine and motion as `linkwise demo`.
 
-Same machine and motion as `linkwise demo`. The torques are the inverse dynamics of a known motion
-and are applied open loop, so the arm must end where that motion ends.
+Run it by: python examples/02_srms_slew.py [PICTURE.svg]
 """
 
 import sys
@@ -26,45 +26,6 @@ def motion(t):
     v = np.outer((1 - np.cos(phase)) / DURATION, way)
     a = np.outer(2 * np.pi * np.sin(phase) / DURATION**2, way)
     return q, v, a
-
-
-def plot(run, path):
-    import matplotlib as mpl
-    from matplotlib import pyplot as plt
-
-    # Fixed identifiers and no time stamp: the same picture gives the same file.
-    mpl.rcParams |= {"svg.hashsalt": "linkwise", "svg.fonttype": "none"}
-    mpl.rcParams |= {"font.sans-serif": ["DejaVu Sans"], "font.size": 9}
-    figure, axes = plt.subplots(
-        1, 3, figsize=(9.6, 3.0), layout="constrained", width_ratios=[1.25, 1, 1]
-    )
-    draw_arm(axes[0], run)
-    halves = (("force", "N", ["fx", "fy", "fz"]), ("moment", "N m", ["nx", "ny", "nz"]))
-    for axis, (half, unit, components) in zip(axes[1:], halves, strict=True):
-        part = run.joint_load.sel(component=components).isel(time=slice(None, None, 10))
-        size = np.sqrt((part**2).sum("component"))
-        for joint in run.joint.values:
-            line = {"label": joint.replace("_", " "), "linewidth": 1.2}
-            axis.plot(part.time, size.sel(joint=joint), **line)
-        axis.set(xlabel="time [s]", ylabel=f"joint {half} [{unit}]", xlim=(0, DURATION), ylim=0)
-    names, labels = axes[2].get_legend_handles_labels()
-    figure.legend(names, labels, loc="outside lower center", ncols=6, frameon=False)
-    for axis in axes:
-        axis.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, metadata={"Date": None, "Creator": None})
-    print(f"figure: {path}")
-
-
-def draw_arm(axis, run):
-    """The joints and the payload's centre in side view, at five times."""
-    for k, when in enumerate(np.linspace(0, DURATION, 5)):
-        q = run.position.sel(time=when, method="nearest").values
-        poses = lw.body_poses(model, q)
-        centre = poses[-1] @ [0.6604 + 0.5, 0, 0, 1]
-        points = np.vstack([[0, 0], poses[:, [0, 2], 3], centre[[0, 2]]])
-        axis.plot(*points.T, "o-", color=str(0.8 - 0.2 * k), markersize=2.5, linewidth=1.2)
-        axis.plot(*points[-1], "s", color=str(0.8 - 0.2 * k), markersize=7)
-    axis.set(xlabel="x [m]", ylabel="z [m]", aspect="equal", title="0, 2.5, ... 10 s")
 
 
 model = lw.scenes.srms(payload_mass=100.0)
@@ -98,4 +59,15 @@ loads = lw.inverse_dynamics_loads(model, *motion(run.time.values))
 difference = np.abs(run.joint_load.values - loads).max() / np.abs(loads).max()
 check("loads against inverse dynamics, relative", difference, 0.0, 1e-4)
 if len(sys.argv) > 1:
-    plot(run, sys.argv[1])
+    from picture import save
+
+    found = lw.loads.quantities(run)
+    panels = [
+        (
+            f"joint {half} [{unit}]",
+            {j.replace("_", " "): found[half].sel(joint=j) for j in peaks.joint.values},
+        )
+        for half, unit in (("force", "N"), ("moment", "N m"))
+    ]
+    tips = {model.joint_names[-1]: (0.6604 + 0.5, 0, 0)}  # the payload's centre
+    save(sys.argv[1], run, panels, times=(0, 2.5, 5, 7.5, 10), tips=tips)

@@ -1,8 +1,8 @@
-"""A tower crane slews and swings its load: what the slewing ring carries, by cause, and how surely.
-
-Run it by: python examples/08_crane_loads.py [REPORT.html]
+"""A tower crane slews and its load swings: what the slewing ring carries, by cause, and how surely.
 
 The slewing motion is given, the rope swings freely; the ring's drive torque is a result.
+
+Run it by: python examples/08_crane_loads.py [PICTURE.svg [REPORT.html]]
 """
 
 import sys
@@ -61,7 +61,24 @@ check("energy that does not add up, relative", lost, 0.0, 1e-5)
 worst = float((bounds.plus_minus / abs(peaks.peak)).sel(quantity="force").max())
 check("largest bound of a force, relative", worst, 0.0, 1e-4)
 if len(sys.argv) > 1:
+    from picture import save
+
+    ring = lw.loads.quantities(run).sel(joint="ring") / 1e3
+    by_cause = {
+        str(cause): shares.sel(joint="ring", component="ny", cause=cause) / 1e3
+        for cause in shares.cause.values
+    }
+    panels = [
+        (
+            "moment of the ring [kN m]",
+            {"tilting": ring.tilting_moment, "torque": ring.torque},
+        ),
+        ("ny by cause [kN m]", by_cause),
+    ]
+    tips = {"rope": (0, 0, -ROPE)}
+    save(sys.argv[1], run, panels, times=(0, 3, 6, 9, 12), tips=tips, view="xy")
+if len(sys.argv) > 2:
     from linkwise.loads.html import write_report
 
     found = {"summary": peaks, "bounds": bounds, "margins": None}
-    print("report:", write_report(run, sys.argv[1], found))
+    print("report:", write_report(run, sys.argv[2], found))

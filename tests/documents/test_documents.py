@@ -72,8 +72,9 @@ def test_commands_of_a_document_run(document, workplace):
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=name)
 def test_example_prints_what_it_must(example, workplace):
+    picture = ["picture.svg"] if "[PICTURE.svg" in example.read_text(encoding="utf-8") else []
     done = subprocess.run(
-        [sys.executable, f"examples/{example.name}"],
+        [sys.executable, f"examples/{example.name}", *picture],
         cwd=workplace,
         capture_output=True,
         text=True,
@@ -83,6 +84,8 @@ def test_example_prints_what_it_must(example, workplace):
     assert done.returncode == 0, done.stdout + done.stderr
     assert ": ok" in done.stdout
     assert "WRONG" not in done.stdout
+    for path in picture:
+        assert "<svg" in (workplace / path).read_text()
 
 
 def test_a_wrong_number_ends_an_example(workplace):
@@ -96,15 +99,11 @@ def test_a_wrong_number_ends_an_example(workplace):
     assert done.stdout.rstrip().endswith("WRONG")
 
 
-def test_the_figure_is_drawn(workplace):
-    subprocess.run(
-        [sys.executable, "examples/02_srms_slew.py", "figure.svg"],
-        cwd=workplace,
-        check=True,
-        capture_output=True,
-        timeout=LONGEST,
-    )
-    assert "<svg" in (workplace / "figure.svg").read_text()
+def test_the_gallery_says_what_the_examples_say():
+    gallery, maker = (ROOT / "docs" / "gallery.md").read_text(), load_tool("make_gallery")
+    for example in maker.SHOWN:
+        assert maker.page(ROOT, example) in gallery, example
+        assert (ROOT / "docs" / maker.picture(example)).is_file(), example
 
 
 @pytest.mark.parametrize("tool", ["check_documents", "check_references"])
