@@ -1,24 +1,69 @@
 #pragma once
 // NumPy arrays in and out: float64 rows with any leading axes. Anything else that NumPy can turn
 // into such an array (lists, integers, other strides) is turned; the common case costs no Python
-// call.
+// call on the way in, one on the way out, and no allocation of its own.
+#include <algorithm>
+#include <cstring>
+#include <initializer_list>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/base/memory.hpp"
 
 namespace linkwise::bindings {
 
 using namespace nanobind::literals;
 
 namespace nb = nanobind;
-using ArrayIn = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
-using ArrayOut = nb::ndarray<nb::numpy, double>;
-using Shape = std::vector<size_t>;
+
+/// Lengths of axes, outermost first.
+class Shape {
+ public:
+  static constexpr size_t max_axes = 16;
+  Shape() = default;
+  Shape(std::initializer_list<size_t> lengths) {
+    for (const size_t n : lengths) append(n);
+  }
+  void append(size_t n) {
+    if (size_ == max_axes) throw InputError("an array has more than 16 axes; give fewer");
+    lengths_[size_++] = n;
+  }
+  size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  size_t& operator[](size_t i) { return lengths_[i]; }
+  size_t operator[](size_t i) const { return lengths_[i]; }
+  const size_t* begin() const { return lengths_; }
+  const size_t* end() const { return lengths_ + size_; }
+  bool operator==(const Shape& other) const {
+    return std::equal(begin(), end(), other.begin(), other.end());
+  }
+  /// The first n axes.
+  Shape head(size_t n) const {
+    Shape out;
+    for (size_t i = 0; i < n; ++i) out.append(lengths_[i]);
+    return out;
+  }
+  Shape operator+(const Shape& tail) const {
+    Shape out = *this;
+    for (const size_t n : tail) out.append(n);
+    return out;
+  }
+
+ private:
+  size_t size_ = 0;
+  size_t lengths_[max_axes];
+};
+
+inline size_t product(const Shape& shape) {
+  size_t n = 1;
+  for (const size_t s : shape) n *= s;
+  return n;
+}
 
 inline std::string shape_text(const Shape& shape) {
   std::string text = "(";
@@ -26,22 +71,64 @@ inline std::string shape_text(const Shape& shape) {
   return text + (shape.size() == 1 ? ",)" : ")");
 }
 
+inline nb::tuple to_tuple(const Shape& shape) {
+  nb::list lengths;
+  for (const size_t n : shape) lengths.append(n);
+  return nb::tuple(lengths);
+}
+
+/// A view of an array's numbers. Made and destroyed with the GIL held.
+class ArrayIn {
+ public:
+  ArrayIn() = default;
+  ArrayIn(ArrayIn&& other) noexcept : view_(std::exchange(other.view_, {})) {}
+  ArrayIn& operator=(ArrayIn&& other) noexcept {
+    std::swap(view_, other.view_);
+    return *this;
+  }
+  ~ArrayIn() { PyBuffer_Release(&view_); }
+
+  /// Takes contiguous float64 numbers; false for anything else.
+  bool open(nb::handle value) {
+    if (PyObject_GetBuffer(value.ptr(), &view_, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) != 0) {
+      PyErr_Clear();
+      view_ = {};
+      return false;
+    }
+    if (view_.format && std::strcmp(view_.format, "d") == 0) return true;
+    PyBuffer_Release(&view_);
+    return false;
+  }
+
+  size_t ndim() const { return view_.ndim; }
+  size_t shape(size_t i) const { return view_.shape[i]; }
+  size_t size() const { return view_.len / sizeof(double); }
+  const double* data() const { return static_cast<const double*>(view_.buf); }
+  double* writable() const { return static_cast<double*>(view_.buf); }
+  nb::object object() const { return nb::borrow<nb::object>(nb::handle(view_.obj)); }
+
+ private:
+  Py_buffer view_{};
+};
+
+inline nb::object numpy(const char* name) { return nb::module_::import_("numpy").attr(name); }
+
 inline ArrayIn as_array(nb::handle value, const char* name) {
   ArrayIn array;
-  if (nb::try_cast(value, array, false)) return array;
+  if (array.open(value)) return array;
   try {
-    const nb::object numpy = nb::module_::import_("numpy");
     const nb::object converted =
-        numpy.attr("array")(value, "dtype"_a = numpy.attr("float64"), "order"_a = "C");
-    return nb::cast<ArrayIn>(converted);
-  } catch (nb::python_error&) {
-    throw InputError(std::string(name) + " is not an array of numbers; give a float64 array");
+        numpy("array")(value, "dtype"_a = numpy("float64"), "order"_a = "C");
+    if (array.open(converted)) return array;
+  } catch (nb::python_error& error) {
+    if (error.matches(PyExc_MemoryError)) throw;
   }
+  throw InputError(std::string(name) + " is not an array of numbers; give a float64 array");
 }
 
 inline Shape shape_of(const ArrayIn& array) {
-  Shape shape(array.ndim());
-  for (size_t i = 0; i < array.ndim(); ++i) shape[i] = array.shape(i);
+  Shape shape;
+  for (size_t i = 0; i < array.ndim(); ++i) shape.append(array.shape(i));
   return shape;
 }
 
@@ -53,7 +140,7 @@ struct Argument {
   bool given = false;
   const double* data = nullptr;
 
-  Argument(const char* name, Shape tail, nb::handle value) : name(name), tail(std::move(tail)) {
+  Argument(const char* name, const Shape& tail, nb::handle value) : name(name), tail(tail) {
     if (value.is_none()) return;
     given = true;
     array = as_array(value, name);
@@ -65,51 +152,38 @@ struct Argument {
                          std::to_string(i) + "; give finite numbers");
   }
 
-  Shape lead() const {
-    Shape shape = shape_of(array);
-    shape.resize(shape.size() - tail.size());
-    return shape;
-  }
+  Shape lead() const { return shape_of(array).head(array.ndim() - tail.size()); }
 
  private:
   void check_shape() const {
-    const Shape shape = shape_of(array);
-    bool ok = shape.size() >= tail.size();
+    bool ok = array.ndim() >= tail.size();
     for (size_t i = 0; ok && i < tail.size(); ++i)
-      ok = shape[shape.size() - tail.size() + i] == tail[i];
+      ok = array.shape(array.ndim() - tail.size() + i) == tail[i];
     if (ok) return;
     std::string expected = "(...";
-    for (size_t n : tail) expected += ", " + std::to_string(n);
-    throw InputError(std::string(name) + " has shape " + shape_text(shape) + " but shape " +
-                     expected + ") is expected");
+    for (const size_t n : tail) expected += ", " + std::to_string(n);
+    throw InputError(std::string(name) + " has shape " + shape_text(shape_of(array)) +
+                     " but shape " + expected + ") is expected");
   }
 };
 
 /// Broadcasts the leading axes of all given arguments against each other, as NumPy does, and points
 /// `data` of each at rows of the common shape. Returns that shape.
-inline Shape broadcast_leading(std::vector<Argument*> arguments) {
+inline Shape broadcast_leading(std::initializer_list<Argument*> arguments) {
   Shape common;
-  bool first = true, same = true;
-  for (Argument* a : arguments) {
-    if (!a->given) continue;
-    const Shape lead = a->lead();
-    if (first)
-      common = lead;
-    else if (lead != common)
-      same = false;
-    first = false;
-  }
-  if (same) return common;
-  common.clear();
-  for (Argument* a : arguments)
-    if (a->given && a->lead().size() > common.size()) common.resize(a->lead().size(), 1);
+  bool several = false;
+  for (const Argument* a : arguments) several |= a->given && a->array.ndim() > a->tail.size();
+  if (!several) return common;
   std::string shapes;
-  bool ok = true;
-  for (Argument* a : arguments) {
+  bool ok = true, same = true;
+  for (const Argument* a : arguments) {
     if (!a->given) continue;
-    const Shape lead = a->lead();
     shapes +=
         (shapes.empty() ? "" : ", ") + std::string(a->name) + " " + shape_text(shape_of(a->array));
+    const Shape lead = a->lead();
+    Shape wide;  // common, with ones in front
+    for (size_t i = common.size(); i < lead.size(); ++i) wide.append(1);
+    common = wide + common;
     for (size_t i = 0; i < lead.size(); ++i) {
       size_t& n = common[common.size() - lead.size() + i];
       if (n == 1)
@@ -120,41 +194,47 @@ inline Shape broadcast_leading(std::vector<Argument*> arguments) {
   }
   if (!ok)
     throw InputError("the leading axes do not broadcast: " + shapes + "; make them equal or 1");
-  const nb::object numpy = nb::module_::import_("numpy");
+  double copies = 0;
+  for (const Argument* a : arguments) {
+    if (!a->given || a->lead() == common) continue;
+    same = false;
+    copies += 8.0 * product(common) * product(a->tail);
+  }
+  if (same) return common;
+  if (copies > worth_a_check)
+    require_memory(copies, "arguments broadcast to leading axes " + shape_text(common));
   for (Argument* a : arguments) {
     if (!a->given || a->lead() == common) continue;
-    nb::list shape;
-    for (size_t n : common) shape.append(n);
-    for (size_t n : a->tail) shape.append(n);
-    const nb::object wide = numpy.attr("ascontiguousarray")(
-        numpy.attr("broadcast_to")(nb::cast(a->array), nb::tuple(shape)));
-    a->array = nb::cast<ArrayIn>(wide);
+    const nb::object rows = numpy("broadcast_to")(a->array.object(), to_tuple(common + a->tail));
+    a->array = as_array(numpy("ascontiguousarray")(rows), a->name);
     a->data = a->array.data();
   }
   return common;
 }
 
-inline size_t product(const Shape& shape) {
-  size_t n = 1;
-  for (size_t s : shape) n *= s;
-  return n;
-}
-
 /// A new array of shape lead + tail.
 struct NewArray {
+  nb::object array;
   double* data;
-  ArrayOut array;
-  NewArray(Shape lead, const Shape& tail) {
-    lead.insert(lead.end(), tail.begin(), tail.end());
-    data = new double[std::max<size_t>(1, product(lead))];
-    nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<double*>(p); });
-    array = ArrayOut(data, lead.size(), lead.data(), owner);
+  explicit NewArray(const Shape& lead, const Shape& tail = {}) {
+    const Shape shape = lead + tail;
+    double bytes = 8;
+    for (const size_t n : shape) bytes *= static_cast<double>(n);
+    if (bytes > worth_a_check) require_memory(bytes, "a result of shape " + shape_text(shape));
+    // Kept for the life of the process: looking it up costs as much as making the array.
+    static const nb::handle empty = numpy("empty").release();
+    array = shape.size() == 1 ? empty(shape[0]) : empty(to_tuple(shape));
+    view_.open(array);
+    data = view_.writable();
   }
+
+ private:
+  ArrayIn view_;
 };
 
 /// A vector as a new 1-D array.
-inline ArrayOut to_numpy(const std::vector<double>& values) {
-  NewArray out({values.size()}, {});
+inline nb::object to_numpy(const std::vector<double>& values) {
+  NewArray out({values.size()});
   std::copy(values.begin(), values.end(), out.data);
   return out.array;
 }

@@ -1,46 +1,19 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 
-#include "arrays.hpp"
 #include "bind.hpp"
-#include "linkwise/dynamics/quantities.hpp"
-#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/forces/passive.hpp"
 #include "linkwise/integrate/integrator.hpp"
 #include "linkwise/solve/registry.hpp"
-#include "py_model.hpp"
 #include "report.hpp"
 #include "solver_options.hpp"
+#include "states.hpp"
 
 namespace linkwise::bindings {
 namespace {
 
 struct ForwardResult {
   nb::object acceleration, joint_load, constraint_force, report;
-};
-
-size_t size(int n) { return static_cast<size_t>(n); }
-
-/// q, v, tau and external wrenches with their leading axes broadcast.
-struct States {
-  Argument q, v, tau, external, prescribed;
-  Shape lead;
-  size_t count;
-  std::vector<double> tau_zero;
-
-  States(const Model& m, nb::handle q_, nb::handle v_, nb::handle tau_, const char* tau_name,
-         nb::handle external_, nb::handle prescribed_ = nb::none())
-      : q("q", {size(m.nq())}, q_),
-        v("v", {size(m.nv())}, v_),
-        tau(tau_name, {size(m.nv())}, tau_),
-        external("external", {size(m.n_joints()), 6}, external_),
-        prescribed("prescribed", {size(m.nv())}, prescribed_) {
-    if (!q.given)
-      throw InputError("q is missing; give an array of shape (..., " + std::to_string(m.nq()) +
-                       ")");
-    lead = broadcast_leading({&q, &v, &tau, &external, &prescribed});
-    count = product(lead);
-  }
 };
 
 void check_external(const Model& m, const States& s) {
@@ -95,10 +68,10 @@ DynamicsOptions dynamics_options(const ForwardOptions& o) {
 /// Runs the chosen method on every system; force is [count][unknowns] when wanted.
 Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, const double* tau,
                    double gravity, double* du, double* loads, std::vector<double>* force,
-                   PyReport& report) {
+                   PyReport& report, Interrupt& interrupt) {
   Outcome worst = Outcome::converged;
   std::vector<double> zero(m.nv());
-  for (size_t i = 0; i < s.count; ++i) {
+  for (size_t i = 0; i < s.count && !interrupt(); ++i) {
     SweepInput<double> in;
     in.q = s.q.data + i * m.nq();
     in.v = s.v.given ? s.v.data + i * m.nv() : zero.data();
@@ -121,34 +94,18 @@ Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, cons
   return worst;
 }
 
-/// Runs f(batch, input, first, count) on parts of a batch that end at whole lane groups, so that
-/// the grouping, and with it every bit, is that of one thread. Returns the largest result.
-template <class F>
-int over_threads(const PyModel& self, Scratch& own, size_t count, const BatchInput& in, int threads,
-                 F&& f) {
-  const Model& m = *self.model;
-  constexpr size_t worth_a_thread = 512;  // bodies: some 20 us of work
-  const size_t groups = (count + native_lanes - 1) / native_lanes;
-  const size_t work = count * m.n_bodies() / worth_a_thread + 1;
-  const int parts = static_cast<int>(std::min({static_cast<size_t>(threads), groups, work}));
-  if (parts <= 1) return f(own.batch, in, 0, count);
-  std::vector<int> results(parts);
-  parallel_for(parts, parts, [&](int i) {
-    const size_t first = groups * i / parts * native_lanes;
-    const size_t last = std::min(count, groups * (i + 1) / parts * native_lanes);
-    const auto from = [&](const double* rows, size_t width) {
-      return rows ? rows + first * width : nullptr;
-    };
-    BatchInput part = in;
-    part.q = from(in.q, m.nq());
-    part.v = from(in.v, m.nv());
-    part.tau = from(in.tau, m.nv());
-    part.du = from(in.du, m.nv());
-    part.external = from(in.external, 6 * m.n_joints());
-    PyModel::Lease scratch(self);
-    results[i] = f(scratch->batch, part, first, last - first);
-  });
-  return *std::max_element(results.begin(), results.end());
+/// The rows of a batch from `first` on.
+BatchInput rows_from(const Model& m, const BatchInput& in, size_t first) {
+  const auto from = [&](const double* rows, size_t width) {
+    return rows ? rows + first * width : nullptr;
+  };
+  BatchInput part = in;
+  part.q = from(in.q, m.nq());
+  part.v = from(in.v, m.nv());
+  part.tau = from(in.tau, m.nv());
+  part.du = from(in.du, m.nv());
+  part.external = from(in.external, 6 * m.n_joints());
+  return part;
 }
 
 nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
@@ -189,11 +146,17 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
     own = make_dynamics(m, options);
     other = own.get();
   }
+  const double scratch_bytes = 8.0 * s.count * m.nv() * (passive || !s.tau.given);
+  const double result_bytes = 8.0 * s.count * (m.nv() + (full ? 6.0 * m.n_joints() : 0));
+  if (scratch_bytes + result_bytes > worth_a_check)
+    require_memory(scratch_bytes + result_bytes,
+                   "forward dynamics of " + std::to_string(s.count) + " states");
   NewArray du(s.lead, {size(m.nv())});
   std::unique_ptr<NewArray> loads;
   if (full) loads = std::make_unique<NewArray>(s.lead, Shape{size(m.n_joints()), 6});
   std::vector<double> passive_tau, force;
   Outcome outcome = Outcome::converged;
+  Interrupt interrupt;
   {
     const nb::gil_scoped_release release;
     const double* total = s.tau.given ? s.tau.data : nullptr;
@@ -206,7 +169,7 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
     }
     if (other) {
       outcome = run_method(m, *other, s, total, gravity, du.data, loads ? loads->data : nullptr,
-                           full ? &force : nullptr, report);
+                           full ? &force : nullptr, report, interrupt);
     } else {
       BatchInput in;
       in.q = s.q.data;
@@ -215,99 +178,84 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
       in.external = s.external.given ? s.external.data : nullptr;
       in.du = s.prescribed.given ? s.prescribed.data : nullptr;
       in.gravity_factor = gravity;
-      const int body = over_threads(
-          self, *scratch, s.count, in, team,
-          [&](BatchEvaluator& batch, const BatchInput& part, size_t first, size_t count) {
-            return batch.forward_dynamics(count, part, du.data + first * m.nv(),
-                                          loads ? loads->data + first * 6 * m.n_joints() : nullptr);
-          });
+      std::atomic<int> body{-1};
+      const auto part = [&](BatchEvaluator& batch, size_t first, size_t count) {
+        const int failed =
+            batch.forward_dynamics(count, rows_from(m, in, first), du.data + first * m.nv(),
+                                   loads ? loads->data + first * 6 * m.n_joints() : nullptr);
+        for (int seen = body; failed > seen && !body.compare_exchange_weak(seen, failed);) {
+        }
+      };
+      over_parts(m, s.count, team, interrupt, [&](size_t first, size_t count) {
+        if (count == s.count) return part(scratch->batch, first, count);
+        PyModel::Lease own_scratch(self);
+        part(own_scratch->batch, first, count);
+      });
       if (body >= 0) {
         outcome = Outcome::not_positive_definite;
         report.body = m.body_name(body);
       }
     }
   }
+  interrupt.rethrow();
   report.outcome = to_string(outcome);
   if (!full) {
     if (outcome != Outcome::converged) throw NumericsError(failure_text(m, report, outcome));
-    return nb::cast(du.array);
+    return du.array;
   }
   ForwardResult result;
-  result.acceleration = nb::cast(du.array);
-  result.joint_load = nb::cast(loads->array);
+  result.acceleration = du.array;
+  result.joint_load = loads->array;
   result.constraint_force = nb::none();
   if (other && !other->constraint_force().empty()) {
     NewArray f(s.lead, {other->constraint_force().size()});
     std::copy(force.begin(), force.end(), f.data);
-    result.constraint_force = nb::cast(f.array);
+    result.constraint_force = f.array;
   }
   result.report = nb::cast(report);
   return nb::cast(result);
 }
 
 nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle a,
-                            nb::handle external, double gravity, bool loads) {
+                            nb::handle external, double gravity, nb::handle threads, bool loads) {
   const Model& m = *self.model;
   States s(m, q, v, a, "acceleration", external);
   check_external(m, s);
   check_gravity(gravity);
   NewArray out(s.lead, loads ? Shape{size(m.n_joints()), 6} : Shape{size(m.nv())});
-  PyModel::Lease scratch(self);
-  const int team_size = threads_of(nb::none(), s.count * m.n_bodies());
-  const nb::gil_scoped_release release;
-  BatchInput in;
-  in.q = s.q.data;
-  in.v = s.v.given ? s.v.data : nullptr;
-  in.du = s.tau.given ? s.tau.data : nullptr;
-  in.external = s.external.given ? s.external.data : nullptr;
-  in.gravity_factor = gravity;
-  const size_t width = loads ? 6 * m.n_joints() : m.nv();
-  over_threads(self, *scratch, s.count, in, team_size,
-               [&](BatchEvaluator& batch, const BatchInput& part, size_t first, size_t count) {
-                 double* rows = out.data + first * width;
-                 batch.inverse_dynamics(count, part, loads ? nullptr : rows,
-                                        loads ? rows : nullptr);
-                 return 0;
-               });
-  const nb::gil_scoped_acquire acquire;
-  return nb::cast(out.array);
+  const int team = threads_of(threads, s.count * m.n_bodies());
+  Interrupt interrupt;
+  {
+    const nb::gil_scoped_release release;
+    BatchInput in;
+    in.q = s.q.data;
+    in.v = s.v.given ? s.v.data : nullptr;
+    in.du = s.tau.given ? s.tau.data : nullptr;
+    in.external = s.external.given ? s.external.data : nullptr;
+    in.gravity_factor = gravity;
+    const size_t width = loads ? 6 * m.n_joints() : m.nv();
+    over_parts(m, s.count, team, interrupt, [&](size_t first, size_t count) {
+      PyModel::Lease scratch(self);
+      double* rows = out.data + first * width;
+      scratch->batch.inverse_dynamics(count, rows_from(m, in, first), loads ? nullptr : rows,
+                                      loads ? rows : nullptr);
+    });
+  }
+  interrupt.rethrow();
+  return out.array;
 }
 
 nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
                        nb::handle external, bool passive, const std::string& method,
-                       const std::string& solver) {
+                       const std::string& solver, nb::handle threads) {
   const nb::object result =
       forward_dynamics(self, q, v, tau, external, passive, method, solver, 1e-12, "energy_norm", 0,
-                       nb::none(), nb::none(), true, 1.0, nb::none());
+                       nb::none(), threads, true, 1.0, nb::none());
   const PyReport& report = nb::cast<PyReport&>(nb::cast<ForwardResult&>(result).report);
   if (report.outcome != "converged")
     throw NumericsError("method " + report.method + ": " + report.outcome +
                         (report.body.empty() ? "" : " at body '" + report.body + "'"));
   return nb::cast<ForwardResult&>(result).joint_load;
-}
-
-nb::object mass_matrix(const PyModel& self, nb::handle q) {
-  const Model& m = *self.model;
-  States s(m, q, nb::none(), nb::none(), "tau", nb::none());
-  NewArray H(s.lead, {size(m.nv()), size(m.nv())});
-  PyModel::Lease scratch(self);
-  if (!scratch->composite) scratch->composite = std::make_unique<CompositeRigidBody>(m);
-  for (size_t i = 0; i < s.count; ++i)
-    scratch->composite->mass_matrix(s.q.data + i * m.nq(), H.data + i * m.nv() * m.nv());
-  return nb::cast(H.array);
-}
-
-/// f(q, v, out) for every state; out has `tail` numbers.
-template <class F>
-nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, const Shape& tail, F&& f) {
-  const Model& m = *self.model;
-  States s(m, q, v, nb::none(), "tau", nb::none());
-  NewArray out(s.lead, tail);
-  const size_t n = product(tail);
-  std::vector<double> zero(m.nv());
-  for (size_t i = 0; i < s.count; ++i)
-    f(m, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : zero.data(), out.data + i * n);
-  return s.lead.empty() && tail.empty() ? nb::object(nb::float_(out.data[0])) : nb::cast(out.array);
 }
 
 nb::list solver_list() {
@@ -407,119 +355,32 @@ void bind_dynamics(nb::module_& m) {
   m.def(
       "inverse_dynamics",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
-         double gravity) { return inverse_dynamics(self, q, v, a, external, gravity, false); },
+         double gravity, nb::handle threads) {
+        return inverse_dynamics(self, q, v, a, external, gravity, threads, false);
+      },
       "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
-      "external"_a = nb::none(), "gravity"_a = 1.0,
+      "external"_a = nb::none(), "gravity"_a = 1.0, "threads"_a = nb::none(),
       "tau (..., nv) [N m, N] that gives the acceleration (..., nv) at q, v: Newton-Euler "
       "recursion, armature included.");
   m.def(
       "inverse_dynamics_loads",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
-         double gravity) { return inverse_dynamics(self, q, v, a, external, gravity, true); },
+         double gravity, nb::handle threads) {
+        return inverse_dynamics(self, q, v, a, external, gravity, threads, true);
+      },
       "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
-      "external"_a = nb::none(), "gravity"_a = 1.0,
+      "external"_a = nb::none(), "gravity"_a = 1.0, "threads"_a = nb::none(),
       "Joint loads (..., n_joints, 6) of a given motion, frames and signs as in joint_loads; "
       "gravity "
       "multiplies the\n"
       "model's gravity.");
   m.def("joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
         nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
-        "solver"_a = "auto",
+        "solver"_a = "auto", "threads"_a = nb::none(),
         "Joint loads (..., n_joints, 6) [N, N m] of the motion that tau causes: the wrench that "
         "the inboard body exerts on\n"
         "the outboard body through the joint, at the joint point, in the joint's outboard frame, "
         "force first.");
-  m.def("mass_matrix", &mass_matrix, "model"_a, "q"_a,
-        "Joint-space mass matrix (..., nv, nv), armature included.");
-  m.def(
-      "passive_torque",
-      [](const PyModel& self, nb::handle q, nb::handle v) {
-        return map_states(self, q, v, {size(self.model->nv())},
-                          [](const Model& m, const double* q, const double* v, double* out) {
-                            std::fill(out, out + m.nv(), 0.0);
-                            add_passive_forces(m, q, v, out);
-                          });
-      },
-      "model"_a, "q"_a, "v"_a,
-      "Torque (..., nv) [N m, N] of the joints' own damping, friction, springs and stops.");
-  m.def(
-      "kinetic_energy",
-      [](const PyModel& self, nb::handle q, nb::handle v) {
-        return map_states(self, q, v, {},
-                          [](const Model& m, const double* q, const double* v, double* out) {
-                            *out = kinetic_energy(m, q, v);
-                          });
-      },
-      "model"_a, "q"_a, "v"_a, "Kinetic energy (...) [J], rotors (armature) included.");
-  m.def(
-      "potential_energy",
-      [](const PyModel& self, nb::handle q) {
-        return map_states(self, q, nb::none(), {},
-                          [](const Model& m, const double* q, const double*, double* out) {
-                            *out = potential_energy(m, q);
-                          });
-      },
-      "model"_a, "q"_a,
-      "Potential energy (...) [J] of gravity (zero at the world origin), springs and stops.");
-  m.def(
-      "momentum",
-      [](const PyModel& self, nb::handle q, nb::handle v) {
-        return map_states(self, q, v, {6},
-                          [](const Model& m, const double* q, const double* v, double* out) {
-                            momentum(m, q, v, out);
-                          });
-      },
-      "model"_a, "q"_a, "v"_a,
-      "Linear [kg m/s] and angular [kg m2/s] momentum (..., 6) about the world origin, world "
-      "axes.");
-  m.def(
-      "body_poses",
-      [](const PyModel& self, nb::handle q) {
-        return map_states(self, q, nb::none(), {size(self.model->n_joints()), 4, 4},
-                          [](const Model& m, const double* q, const double*, double* out) {
-                            body_poses(m, q, out);
-                          });
-      },
-      "model"_a, "q"_a,
-      "Poses (..., n_bodies, 4, 4) of the bodies' frames (their joints' outboard frames) in the "
-      "world.");
-  m.def(
-      "link_poses",
-      [](const PyModel& self, nb::handle q) {
-        return map_states(self, q, nb::none(), {self.model->links.size(), 4, 4},
-                          [](const Model& m, const double* q, const double*, double* out) {
-                            link_poses(m, q, out);
-                          });
-      },
-      "model"_a, "q"_a,
-      "Poses (..., links, 4, 4) of all links of the source, merged ones too, in the world.");
-  m.def(
-      "body_jacobian",
-      [](const PyModel& self, nb::handle q, nb::handle body) {
-        int joint = -1;
-        if (nb::isinstance<nb::str>(body)) {
-          const LinkInfo& link =
-              self.model->links[self.model->link_index(nb::cast<std::string>(body))];
-          joint = link.joint;
-          if (joint < 0 || self.model->links[self.model->joints[joint].link].name != link.name)
-            throw InputError("link '" + link.name +
-                             "' is welded and has no frame of its own; name the body that carries "
-                             "it (Model.notes)");
-        } else {
-          joint = nb::cast<int>(body);
-          if (joint < 0 || joint >= self.model->n_joints())
-            throw InputError("body index " + std::to_string(joint) +
-                             " is out of range; the model has " +
-                             std::to_string(self.model->n_joints()) + " bodies");
-        }
-        return map_states(self, q, nb::none(), {6, size(self.model->nv())},
-                          [joint](const Model& m, const double* q, const double*, double* out) {
-                            body_jacobian(m, q, joint, out);
-                          });
-      },
-      "model"_a, "q"_a, "body"_a,
-      "Jacobian (..., 6, nv) of a body's frame in its own axes, linear first; body: name or "
-      "index.");
   m.def("solvers", &solver_list, "The table of linear solvers, as dictionaries.");
   m.def("methods", &method_list, "The table of dynamics methods, as dictionaries.");
   m.def("integrators", &integrator_list, "The table of integrators, as dictionaries.");

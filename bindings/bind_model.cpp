@@ -260,7 +260,7 @@ nb::list joint_axes(const PyModel& self) {
   return out;
 }
 
-ArrayOut link_centers_of_mass(const PyModel& self) {
+nb::object link_centers_of_mass(const PyModel& self) {
   const std::vector<LinkSpec>& links = self.model->spec().links;
   NewArray out({links.size()}, {3});
   double* row = out.data;
@@ -269,7 +269,7 @@ ArrayOut link_centers_of_mass(const PyModel& self) {
   return out.array;
 }
 
-ArrayOut link_inertias(const PyModel& self) {
+nb::object link_inertias(const PyModel& self) {
   const std::vector<LinkSpec>& links = self.model->spec().links;
   NewArray out({links.size()}, {3, 3});
   double* row = out.data;

@@ -96,7 +96,7 @@ class PyConstraintSystem {
   const BlockTree& A() const { return system_.A(); }
   const Model& model() const { return *model_; }
 
-  ArrayOut right_hand_side() const { return to_numpy(system_.b()); }
+  nb::object right_hand_side() const { return to_numpy(system_.b()); }
 
   std::vector<double> unknowns(nb::handle value, const char* name) const {
     const Argument given(name, {size(A().size())}, value);
@@ -106,7 +106,7 @@ class PyConstraintSystem {
     return {given.data, given.data + A().size()};
   }
 
-  ArrayOut multiply(nb::handle x) const {
+  nb::object multiply(nb::handle x) const {
     std::vector<double> y(A().size());
     A().multiply(unknowns(x, "f"), y);
     return to_numpy(y);
@@ -121,7 +121,7 @@ class PyConstraintSystem {
     return std::sqrt(std::max(0.0, sum));
   }
 
-  ArrayOut dense() const {
+  nb::object dense() const {
     const size_t n = A().size();
     NewArray out({n, n}, {});
     std::vector<double> unit(n);
@@ -266,7 +266,7 @@ class PyEvaluator {
         method_(make_dynamics(*owner.model, options_)) {}
 
   const Choice& choice() const { return choice_; }
-  ArrayOut constraint_force() const {
+  nb::object constraint_force() const {
     const std::span<const double> f = method_->constraint_force();
     return to_numpy({f.begin(), f.end()});
   }

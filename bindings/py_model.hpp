@@ -27,7 +27,12 @@ inline int threads_of(nanobind::handle asked, size_t work) {
 struct Scratch {
   explicit Scratch(const Model& model) : batch(model), model_(&model) {}
   BatchEvaluator batch;
-  std::unique_ptr<CompositeRigidBody> composite;
+  const Model& model() const { return *model_; }
+
+  void mass_matrix(const double* q, double* H) {
+    if (!composite_) composite_ = std::make_unique<CompositeRigidBody>(*model_);
+    composite_->mass_matrix(q, H);
+  }
 
   /// Does "auto" take the piecewise method for one state of this model?
   bool piecewise_suits() {
@@ -46,6 +51,7 @@ struct Scratch {
 
  private:
   const Model* model_;
+  std::unique_ptr<CompositeRigidBody> composite_;
   std::unique_ptr<DynamicsMethod> piecewise_;
   int suits_ = -1, piecewise_threads_ = 0;
 };

@@ -62,6 +62,7 @@ _PUBLIC = {
     "open_run": "linkwise.record.read",
     "run_scenario": "linkwise.simulation",
     "simulate": "linkwise.simulation",
+    "simulate_batch": "linkwise.batch_simulation",
     "sweep": "linkwise.sweeping",
 }
 _SUBMODULES = ("drives", "loads", "scenes")
@@ -113,6 +114,7 @@ __all__ = [
     "run_scenario",
     "scenes",
     "simulate",
+    "simulate_batch",
     "solver_options",
     "solvers",
     "stop_rules",
@@ -152,6 +154,7 @@ if TYPE_CHECKING:
         solvers,
         stop_rules,
     )
+    from linkwise.batch_simulation import simulate_batch
     from linkwise.drives import PD, Drive, Free, Locked, Motion, Spring, Table, Torque, Wrench
     from linkwise.io.load import load
     from linkwise.record.read import open_run

@@ -47,7 +47,7 @@ class SimulationInterrupted(KeyboardInterrupt):
         self.run = run
 
 
-def _check_driven(
+def check_driven(
     model: Model, drives: Mapping[str, Any] | None, wrenches: Mapping[str, Any] | None
 ) -> tuple[dict[str, Drive], dict[str, Wrench]]:
     """Drives by joint and wrenches by body; unknown names and unusable values are refused."""
@@ -222,7 +222,7 @@ def simulate(
         state_vector("q0", q0, model.nq, model.neutral_configuration()),
         state_vector("v0", v0, model.nv, np.zeros(model.nv)),
     )
-    by_joint, by_body = _check_driven(model, drives, wrenches)
+    by_joint, by_body = check_driven(model, drives, wrenches)
     schema = build_schema(model, quantities, joints, by_body)
     if on_failure not in ("raise", "return"):
         raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
@@ -264,6 +264,13 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_body)
+    if output is None:
+        # The chunks of the largest variable stand beside what they are joined to.
+        largest = max((variable.row_bytes for variable in schema.variables), default=0)
+        _core.require_memory(
+            float(sampled.size) * (schema.row_bytes + largest),
+            f"a recording of {sampled.size} samples in memory (output= writes them to disk)",
+        )
     record = _recorder(model, schema, attrs, sampled.size, output)
     run, ending = _record(model, simulation, record, schema, sampled, progress)
     if on_failure == "raise":

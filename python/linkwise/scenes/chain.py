@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from linkwise._core import InputError, make_chain
+from linkwise._core import InputError, make_chain, require_memory
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -34,6 +34,16 @@ def joint_axes(axes: str | ArrayLike, n: int, seed: int) -> np.ndarray:
     if axes == "random":
         return np.random.default_rng(seed).normal(size=(n, 3))
     raise InputError(f"axes {axes!r} is unknown; known: {', '.join(_PATTERNS)}, or an array (k, 3)")
+
+
+#: Of a model and one evaluation of it; `linkwise bench --cases memory` measures it.
+BYTES_PER_BODY = 1800
+
+
+def check_bodies(n: int) -> None:
+    """InputError unless ``n`` is a number of bodies, MemoryError when there is no room for them."""
+    check_count("n_bodies", n)
+    require_memory(float(BYTES_PER_BODY * n), f"a machine of {n} bodies")
 
 
 def check_count(name: str, n: int, least: int = 1) -> None:
@@ -72,8 +82,9 @@ def chain(
 
     Raises:
         InputError: a value is out of range.
+        MemoryError: there is no room for so many bodies.
     """
-    check_count("n_bodies", n_bodies)
+    check_bodies(n_bodies)
     for name, value in (("length", length), ("mass", mass), ("radius", radius)):
         if not (np.isfinite(value) and value > 0):
             raise InputError(f"{name} is {value!r}; give a positive number")

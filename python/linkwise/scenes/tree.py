@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise._core import ModelBuilder
-from linkwise.scenes.chain import EARTH, check_count, joint_axes, rod_inertia
+from linkwise.scenes.chain import EARTH, check_bodies, check_count, joint_axes, rod_inertia
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -33,7 +33,7 @@ def tree(
     The children of a rod start at its end and are fanned out about z, 60 degrees from it. Arguments
     and errors as in :func:`linkwise.scenes.chain`; ``branching`` 1 is a chain.
     """
-    check_count("n_bodies", n_bodies)
+    check_bodies(n_bodies)
     check_count("branching", branching)
     directions = joint_axes(axes, n_bodies, seed)
     builder = ModelBuilder("tree", gravity=gravity)

@@ -6,6 +6,7 @@
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/quantities.hpp"
 #include "linkwise/forces/passive.hpp"
+#include "linkwise/simulate/given_motion.hpp"
 
 namespace linkwise {
 
@@ -52,28 +53,17 @@ void Simulation::add_wrench(Wrench wrench) {
 
 void Simulation::start(double t0, const double* q0, const double* v0) {
   const Model& m = *model_;
-  ModelSpec spec;
-  any_prescribed_ = any_motion_ = false;
-  for (int j = 0; j < m.n_joints(); ++j) {
-    if (!is_prescribed(drives_[j].kind)) continue;
-    const JointInfo& info = m.joints[j];
-    any_motion_ |= drives_[j].kind == DriveKind::motion;
-    for (int i = 0; i < info.nv; ++i)
-      if (drives_[j].kind == DriveKind::locked && v0[info.v + i] != 0)
-        throw InputError("joint '" + info.name + "'" + m.where() +
-                         " is locked but starts with a rate; start it at rest");
-    if (!any_prescribed_) spec = m.spec();
-    any_prescribed_ = true;
-    spec.prescribed.push_back(info.name);
-  }
+  any_motion_ = false;
+  for (const Drive& drive : drives_) any_motion_ |= drive.kind == DriveKind::motion;
+  check_locked_joints(m, drives_, v0);
   if (any_motion_ && options_.state == StateChoice::body_velocities)
     throw InputError(
         "state body_velocities takes no motion drives; use the state joint_rates for them");
-  driven_ = any_prescribed_ ? std::make_unique<const Model>(std::move(spec)) : nullptr;
+  driven_ = driven_model(m, drives_);
   const Model& driven = driven_ ? *driven_ : m;
   method_ = make_dynamics(driven, options_.dynamics);
   output_method_ = make_dynamics(driven, options_.dynamics);
-  inverse_ = any_prescribed_ ? std::make_unique<InverseDynamics<double>>(m) : nullptr;
+  inverse_ = driven_ ? std::make_unique<InverseDynamics<double>>(m) : nullptr;
   world_wrenches_ = false;
   for (const Wrench& w : wrenches_) world_wrenches_ |= w.world;
   tau_.resize(m.nv());
@@ -95,14 +85,7 @@ void Simulation::start(double t0, const double* q0, const double* v0) {
     y_.insert(y_.end(), v0, v0 + m.nv());
   }
   impose_motion(t0, y_.data());
-  for (const Element& e : m.elements) {
-    if (e.kind != ElementKind::spherical && e.kind != ElementKind::floating) continue;
-    const double* p = &y_[e.q + e.nq - 4];
-    const double norm = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
-    if (!(norm > 1e-6))
-      throw InputError("joint '" + m.joints[e.joint].name + "'" + m.where() +
-                       ": its quaternion has zero length; give x, y, z, w of length 1");
-  }
+  check_quaternions(m, y_.data());
   normalise(y_.data());
   iterations_ = 0;
   trace_.clear();
@@ -202,24 +185,13 @@ bool Simulation::evaluate_imposed(double t, const double* y, double* ydot) {
   const double *q = imposed_.data(), *v = q + m.nq();
   position_rates(q, v, ydot);
   const bool ok = accelerations(*method_, t, q, v, ydot + m.nq(), nullptr);
-  // Given motions are not integrated: their entries of the state rest where they started.
-  for (int j = 0; j < m.n_joints(); ++j) {
-    if (drives_[j].kind != DriveKind::motion) continue;
-    const JointInfo& info = m.joints[j];
-    std::fill_n(ydot + info.q, info.nq, 0.0);
-    std::fill_n(ydot + m.nq() + info.v, info.nv, 0.0);
-  }
+  rest_imposed(m, drives_, ydot, ydot + m.nq());
   return ok;
 }
 
 void Simulation::impose_motion(double t, double* y) {
   if (!any_motion_) return;
-  const Model& m = *model_;
-  for (int j = 0; j < m.n_joints(); ++j) {
-    if (drives_[j].kind != DriveKind::motion) continue;
-    const JointInfo& info = m.joints[j];
-    evaluate_motion(info, drives_[j], t, y + info.q, y + m.nq() + info.v, &prescribed_[info.v]);
-  }
+  linkwise::impose_motion(*model_, drives_, t, y, y + model_->nq(), prescribed_.data());
 }
 
 void Simulation::position_rates(const double* q, const double* v, double* qdot) {
@@ -230,14 +202,7 @@ void Simulation::position_rates(const double* q, const double* v, double* qdot) 
   for (const Element& e : model_->elements) element_position_rate(e, q, v, qdot);
 }
 
-void Simulation::normalise(double* y) {
-  for (const Element& e : model_->elements) {
-    if (e.kind != ElementKind::spherical && e.kind != ElementKind::floating) continue;
-    double* p = y + e.q + e.nq - 4;
-    const double norm = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
-    for (int i = 0; i < 4; ++i) p[i] /= norm;
-  }
-}
+void Simulation::normalise(double* y) { normalise_quaternions(*model_, y); }
 
 void Simulation::accepted(double t, const double*) {
   if (!trace_.empty()) trace_.back().accepted = true;
@@ -250,6 +215,11 @@ void Simulation::accepted(double t, const double*) {
 bool Simulation::advance(double t, const Sample& sample) {
   if (!stop_.ok()) return false;
   while (integrator_->time() < t) {
+    if (interrupted_ && interrupted_()) {
+      stop_.outcome = "interrupted";
+      stop_.time = integrator_->time();
+      return false;
+    }
     const StepStatus status = integrator_->step(t);
     if (status == StepStatus::ok) continue;
     stop_.time = integrator_->time();
@@ -310,7 +280,7 @@ bool Simulation::write_sample(double t, const Sample& s) {
 /// What moves or holds a joint of given motion: the torque of the motion less what the joint does
 /// by itself.
 void Simulation::write_holding_torques(const double* q, const double* v, double* drive_torque) {
-  if (!any_prescribed_) return;
+  if (!driven_) return;
   const Model& m = *model_;
   SweepInput<double> in;
   in.q = q;

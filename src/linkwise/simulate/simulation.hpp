@@ -1,6 +1,7 @@
 #pragma once
 // The time loop: drives, dynamics and integrator, sampled at the times asked for. Free of Python
 // apart from user callables.
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -76,6 +77,9 @@ class Simulation : private OdeSystem {
   const Stop& stop() const { return stop_; }
   SimulationStatistics statistics() const;
 
+  /// Asked at every step: once it is true, the run stops with the outcome "interrupted".
+  void set_interrupt(std::function<bool()> interrupted) { interrupted_ = std::move(interrupted); }
+
   /// From the next start on, records every evaluation that the integrator asks for.
   void keep_trace(bool wanted) { keeps_trace_ = wanted; }
   const std::vector<EvaluationTrace>& trace() const { return trace_; }
@@ -83,6 +87,9 @@ class Simulation : private OdeSystem {
   double velocity_drift() const { return drift_; }
 
   const Choice& choice() const { return choice_; }
+  const SimulationOptions& options() const { return options_; }
+  const std::vector<Drive>& drives() const { return drives_; }
+  const std::vector<Wrench>& wrenches() const { return wrenches_; }
 
  private:
   int size() const override {
@@ -112,7 +119,7 @@ class Simulation : private OdeSystem {
   Choice choice_;
   std::vector<Drive> drives_;
   std::vector<Wrench> wrenches_;
-  bool world_wrenches_ = false, any_prescribed_ = false, any_motion_ = false;
+  bool world_wrenches_ = false, any_motion_ = false;
   std::unique_ptr<DynamicsMethod> method_, output_method_;
   std::unique_ptr<InverseDynamics<double>> inverse_;
   std::unique_ptr<Integrator> integrator_;
@@ -122,6 +129,7 @@ class Simulation : private OdeSystem {
   long iterations_ = 0;
   bool keeps_trace_ = false;
   std::vector<EvaluationTrace> trace_;
+  std::function<bool()> interrupted_;
   Stop stop_, pending_;
 };
 

@@ -6,6 +6,7 @@
 
 #include "linkwise/base/assert.hpp"
 #include "linkwise/base/error.hpp"
+#include "linkwise/base/memory.hpp"
 
 namespace linkwise {
 namespace {
@@ -16,6 +17,19 @@ TEST(InputError, IsAnInvalidArgumentWithTheWholeMessage) {
     throw InputError("joint 'elbow': axis has zero length; give a nonzero axis");
   } catch (const std::exception& error) {
     EXPECT_STREQ(error.what(), "joint 'elbow': axis has zero length; give a nonzero axis");
+  }
+}
+
+TEST(Memory, WhatCannotFitIsRefusedWithTheEstimate) {
+  EXPECT_GT(available_memory(), worth_a_check);
+  EXPECT_NO_THROW(require_memory(worth_a_check, "little"));
+  try {
+    require_memory(3.0 * (1ull << 50), "a result of shape (7,)");
+    FAIL();
+  } catch (const std::bad_alloc& error) {
+    EXPECT_EQ(std::string(error.what()).rfind("a result of shape (7,) needs about 3.15e+06 GiB", 0),
+              0u)
+        << error.what();
   }
 }
 

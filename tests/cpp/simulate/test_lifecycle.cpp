@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "linkwise/dynamics/batch.hpp"
+#include "linkwise/simulate/batch_simulation.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "simulate/recording.hpp"
 
@@ -65,6 +66,28 @@ TEST(Lifecycle, Simulations) {
       simulation.start(0, state.q.data(), at_rest.data());
       ASSERT_EQ(run(simulation, {0.0015}).size(), 1u);
     }
+}
+
+TEST(Lifecycle, BatchesOfSimulations) {
+  Draws draws(125);
+  const auto model = make_model(stacked_spec(draws));
+  const MachineState state = random_state(*model, draws);
+  std::vector<double> q, v;
+  for (int i = 0; i < 3; ++i) {
+    q.insert(q.end(), state.q.begin(), state.q.end());
+    v.insert(v.end(), state.v.begin(), state.v.end());
+  }
+  const double times[] = {0.0015};
+  std::vector<double> loads(3 * 6 * model->n_joints());
+  Sample sample;
+  sample.joint_load = loads.data();
+  for (int i = 0; i < cycles; ++i) {
+    const Simulation simulation(model, fixed_step(1e-3));
+    const Simulation* const all[] = {&simulation};
+    const auto ends =
+        simulate_batch(all, 3, {q.data(), v.data()}, times, sample, 2, [] { return true; });
+    ASSERT_EQ(ends[2].outcome, "converged");
+  }
 }
 
 }  // namespace

@@ -73,6 +73,21 @@ TEST(Stops, AStateThatBlowsUpIsNotFinite) {
   for (const Instant& i : at) EXPECT_TRUE(std::isfinite(i.q[0] + i.v[0]));
 }
 
+TEST(Stops, WhenItIsAskedTo) {
+  const auto model = make_model(pendulum());
+  for (IntegratorKind kind : all_kinds()) {
+    Simulation simulation(model, fixed_step(1e-3, kind));
+    int asked = 0;
+    simulation.set_interrupt([&] { return ++asked > 20; });
+    const double q = 0.5, v = 0;
+    simulation.start(0, &q, &v);
+    EXPECT_EQ(run(simulation, {0, 1e-3, 1e9}).size(), 2u);
+    EXPECT_EQ(simulation.stop().outcome, "interrupted");
+    EXPECT_GT(simulation.stop().time, 1e-3);
+    EXPECT_LT(simulation.stop().time, 1e3);
+  }
+}
+
 TEST(Stops, AStartThatIsNotFinite) {
   const auto model = make_model(pendulum());
   for (IntegratorKind kind : all_kinds()) {

@@ -1,0 +1,153 @@
+// What a state alone tells: poses, Jacobians, energies, momenta, the mass matrix.
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+
+#include "bind.hpp"
+#include "linkwise/dynamics/quantities.hpp"
+#include "linkwise/forces/passive.hpp"
+#include "states.hpp"
+
+namespace linkwise::bindings {
+namespace {
+
+/// f(scratch, q, v, out) for every state, over threads; out has `tail` numbers. v is zero where it
+/// is None.
+template <class F>
+nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handle threads,
+                      const Shape& tail, F&& f) {
+  const Model& m = *self.model;
+  States s(m, q, v, nb::none(), "tau", nb::none());
+  NewArray out(s.lead, tail);
+  const size_t n = product(tail);
+  const int team = threads_of(threads, s.count * m.n_bodies());
+  const std::vector<double> zero(m.nv());
+  Interrupt interrupt;
+  {
+    const nb::gil_scoped_release release;
+    over_parts(m, s.count, team, interrupt, [&](size_t first, size_t count) {
+      PyModel::Lease scratch(self);
+      for (size_t i = first; i < first + count; ++i)
+        f(*scratch, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : zero.data(),
+          out.data + i * n);
+    });
+  }
+  interrupt.rethrow();
+  return s.lead.empty() && tail.empty() ? nb::object(nb::float_(out.data[0])) : out.array;
+}
+
+}  // namespace
+
+void bind_kinematics(nb::module_& m) {
+  m.def("require_memory", &require_memory, "bytes"_a, "what"_a,
+        "MemoryError, with the estimate, where so many bytes are not available.");
+  m.def(
+      "mass_matrix",
+      [](const PyModel& self, nb::handle q, nb::handle threads) {
+        const size_t nv = self.model->nv();
+        return map_states(self, q, nb::none(), threads, {nv, nv},
+                          [](Scratch& scratch, const double* q, const double*, double* out) {
+                            scratch.mass_matrix(q, out);
+                          });
+      },
+      "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
+      "Joint-space mass matrix (..., nv, nv), armature included.");
+  m.def(
+      "passive_torque",
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
+        return map_states(self, q, v, threads, {size(self.model->nv())},
+                          [](Scratch& scratch, const double* q, const double* v, double* out) {
+                            const Model& m = scratch.model();
+                            std::fill(out, out + m.nv(), 0.0);
+                            add_passive_forces(m, q, v, out);
+                          });
+      },
+      "model"_a, "q"_a, "v"_a, nb::kw_only(), "threads"_a = nb::none(),
+      "Torque (..., nv) [N m, N] of the joints' own damping, friction, springs and stops.");
+  m.def(
+      "kinetic_energy",
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
+        return map_states(self, q, v, threads, {},
+                          [](Scratch& scratch, const double* q, const double* v, double* out) {
+                            const Model& m = scratch.model();
+                            *out = kinetic_energy(m, q, v);
+                          });
+      },
+      "model"_a, "q"_a, "v"_a, nb::kw_only(), "threads"_a = nb::none(),
+      "Kinetic energy (...) [J], rotors (armature) included.");
+  m.def(
+      "potential_energy",
+      [](const PyModel& self, nb::handle q, nb::handle threads) {
+        return map_states(self, q, nb::none(), threads, {},
+                          [](Scratch& scratch, const double* q, const double*, double* out) {
+                            const Model& m = scratch.model();
+                            *out = potential_energy(m, q);
+                          });
+      },
+      "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
+      "Potential energy (...) [J] of gravity (zero at the world origin), springs and stops.");
+  m.def(
+      "momentum",
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
+        return map_states(self, q, v, threads, {6},
+                          [](Scratch& scratch, const double* q, const double* v, double* out) {
+                            const Model& m = scratch.model();
+                            momentum(m, q, v, out);
+                          });
+      },
+      "model"_a, "q"_a, "v"_a, nb::kw_only(), "threads"_a = nb::none(),
+      "Linear [kg m/s] and angular [kg m2/s] momentum (..., 6) about the world origin, world "
+      "axes.");
+  m.def(
+      "body_poses",
+      [](const PyModel& self, nb::handle q, nb::handle threads) {
+        return map_states(self, q, nb::none(), threads, {size(self.model->n_joints()), 4, 4},
+                          [](Scratch& scratch, const double* q, const double*, double* out) {
+                            const Model& m = scratch.model();
+                            body_poses(m, q, out);
+                          });
+      },
+      "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
+      "Poses (..., n_bodies, 4, 4) of the bodies' frames (their joints' outboard frames) in the "
+      "world.");
+  m.def(
+      "link_poses",
+      [](const PyModel& self, nb::handle q, nb::handle threads) {
+        return map_states(self, q, nb::none(), threads, {self.model->links.size(), 4, 4},
+                          [](Scratch& scratch, const double* q, const double*, double* out) {
+                            const Model& m = scratch.model();
+                            link_poses(m, q, out);
+                          });
+      },
+      "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
+      "Poses (..., links, 4, 4) of all links of the source, merged ones too, in the world.");
+  m.def(
+      "body_jacobian",
+      [](const PyModel& self, nb::handle q, nb::handle body, nb::handle threads) {
+        int joint = -1;
+        if (nb::isinstance<nb::str>(body)) {
+          const LinkInfo& link =
+              self.model->links[self.model->link_index(nb::cast<std::string>(body))];
+          joint = link.joint;
+          if (joint < 0 || self.model->links[self.model->joints[joint].link].name != link.name)
+            throw InputError("link '" + link.name +
+                             "' is welded and has no frame of its own; name the body that carries "
+                             "it (Model.notes)");
+        } else {
+          joint = nb::cast<int>(body);
+          if (joint < 0 || joint >= self.model->n_joints())
+            throw InputError("body index " + std::to_string(joint) +
+                             " is out of range; the model has " +
+                             std::to_string(self.model->n_joints()) + " bodies");
+        }
+        return map_states(self, q, nb::none(), threads, {6, size(self.model->nv())},
+                          [joint](Scratch& scratch, const double* q, const double*, double* out) {
+                            const Model& m = scratch.model();
+                            body_jacobian(m, q, joint, out);
+                          });
+      },
+      "model"_a, "q"_a, "body"_a, nb::kw_only(), "threads"_a = nb::none(),
+      "Jacobian (..., 6, nv) of a body's frame in its own axes, linear first; body: name or "
+      "index.");
+}
+
+}  // namespace linkwise::bindings

@@ -1,0 +1,200 @@
+"""Many simulations in one call: initial states, torques, machines side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise import _core
+from linkwise._core import InputError, Model
+from linkwise.arguments import number, optional_count, sample_times
+from linkwise.record.provenance import plain, provenance
+from linkwise.record.schema import TIME_ATTRS, Schema, build_schema
+from linkwise.result import Run
+from linkwise.simulation import SimulationInterrupted, check_driven
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from linkwise.drives import Drive, Wrench
+
+QUANTITIES = ("position", "velocity", "acceleration", "joint_load", "drive_torque", "energy")
+Array = npt.NDArray[np.float64]
+
+
+def _machines(model: Model | Sequence[Model]) -> list[Model]:
+    """The models, alike in their joints."""
+    models = [model] if isinstance(model, Model) else list(model)
+    if not models or not all(isinstance(one, Model) for one in models):
+        raise InputError("model: give a Model, or a sequence of at least one")
+    for k, one in enumerate(models):
+        if one.joint_names != models[0].joint_names or one.joint_types != models[0].joint_types:
+            raise InputError(f"model: model[{k}] has other joints than model[0]; simulate it apart")
+    return models
+
+
+def _rows(name: str, values: Any, width: int) -> Array:
+    """(..., width) finite numbers."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected an array of numbers") from None
+    if array.ndim == 0 or array.shape[-1] != width:
+        raise InputError(f"{name}: expected shape (..., {width}), given shape {array.shape}")
+    if not np.isfinite(array).all():
+        at = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+        raise InputError(f"{name}: expected finite numbers, {name}{list(at)} is {array[at]}")
+    return array
+
+
+def _members(given: dict[str, Array], models: int) -> tuple[tuple[int, ...], dict[str, Array]]:
+    """The members' axes, and every argument as rows (models * members, width)."""
+    try:
+        lead = np.broadcast_shapes(*(array.shape[:-1] for array in given.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in given.items())
+        raise InputError(
+            f"the leading axes do not broadcast: {shapes}; make them equal or 1"
+        ) from None
+    rows = {
+        name: np.broadcast_to(array, (models, *lead, array.shape[-1])).reshape(-1, array.shape[-1])
+        for name, array in given.items()
+    }
+    return lead, rows
+
+
+def _dataset(
+    columns: dict[str, Any], lead: tuple[int, ...], schema: Schema, times: Array, several: bool
+) -> xr.Dataset:
+    """The arrays (members, times, ...) of the core, with their axes and labels."""
+    import xarray as xr
+
+    axes = len(lead) - several
+    dims = (*(("model",) if several else ()), *(f"member_{k + 1}" for k in range(axes)))
+    if axes == 1:
+        dims = (*dims[:-1], "member")
+    data = {
+        variable.name: (
+            (*dims, "time", *variable.dims),
+            columns[variable.name].reshape((*lead, times.size, *variable.shape)),
+            dict(variable.attrs),
+        )
+        for variable in schema.variables
+    }
+    coordinates = {
+        name: (coordinate.dims, coordinate.values, dict(coordinate.attrs))
+        for name, coordinate in schema.coordinates.items()
+    }
+    ends = {
+        "outcome": (dims, np.array(columns["outcome"], dtype=np.str_).reshape(lead)),
+        "stop_time": (dims, columns["stop_time"].reshape(lead), {"units": "s"}),
+    }
+    return xr.Dataset(
+        data, coords={"time": ("time", times, dict(TIME_ATTRS)), **coordinates, **ends}
+    )
+
+
+def simulate_batch(
+    model: Model | Sequence[Model],
+    *,
+    step: float,
+    duration: float | None = None,
+    q0: npt.ArrayLike | None = None,
+    v0: npt.ArrayLike | None = None,
+    tau: npt.ArrayLike | None = None,
+    drives: Mapping[str, Drive | Any] | None = None,
+    wrenches: Mapping[str, Wrench] | None = None,
+    every: float | None = None,
+    times: npt.ArrayLike | None = None,
+    integrator: str = "runge_kutta_4",
+    quantities: Collection[str] | None = None,
+    threads: int | None = None,
+) -> xr.Dataset:
+    """Simulate many motions at once with fixed steps: members in SIMD lanes, lanes over threads.
+
+    Args:
+        model: The mechanism, or several with the same joints (payloads, parameters), each of which
+            is simulated with all states. Members of one model share SIMD lanes; a model with one
+            state has none to share them with.
+        step: Step of the integrator [s].
+        duration: Seconds to simulate; may be left out when `times` are given.
+        q0: Initial coordinates (..., nq); the neutral configuration by default.
+        v0: Initial velocities (..., nv); zero by default.
+        tau: Constant joint torques (..., nv) beside the drives. The leading axes of q0, v0 and tau
+            broadcast to those of the members.
+        drives, wrenches: As for `simulate`, the same for all members; functions are refused.
+        every, times: When to record, as for `simulate`.
+        integrator: "runge_kutta_4" or "semi_implicit_euler".
+        quantities: What to record, of "position", "velocity", "acceleration", "joint_load",
+            "drive_torque", "energy"; all by default.
+        threads: Worker threads; the results do not depend on it.
+
+    Returns:
+        The variables of a run with the members' axes in front: `model` where several are given,
+        then `member`, or `member_1`, `member_2`, ... A member that cannot go on ends alone: its
+        `outcome` says why, `stop_time` when, and its later samples are NaN.
+
+    Raises:
+        InputError: an argument is wrong; nothing was simulated.
+        MemoryError: the samples would not fit into memory; nothing was simulated.
+        SimulationInterrupted: Ctrl-C; `.run` holds what was computed.
+    """
+    models = _machines(model)
+    first = models[0]
+    sampled = sample_times(duration, every, times)
+    schema = build_schema(first, QUANTITIES if quantities is None else quantities)
+    unknown = [name for name in schema.quantities if name not in QUANTITIES]
+    if unknown:
+        raise InputError(f"quantities: a batch has no {unknown[0]!r}; use {', '.join(QUANTITIES)}")
+    given = {
+        "q0": _rows("q0", first.neutral_configuration() if q0 is None else q0, first.nq),
+        "v0": _rows("v0", np.zeros(first.nv) if v0 is None else v0, first.nv),
+    }
+    if tau is not None:
+        given["tau"] = _rows("tau", tau, first.nv)
+    fixed = [entry["name"] for entry in _core.integrators() if entry["fixed_step"]]
+    if integrator not in fixed:
+        raise InputError(f"integrator: a batch takes {' or '.join(fixed)}, not {integrator!r}")
+    options = {"integrator": integrator, "step": number("step", step)}
+    simulations = []
+    for one in models:
+        by_joint, by_body = check_driven(one, drives, wrenches)
+        simulation = _core.Simulation(one, **options)
+        for joint, drive in by_joint.items():
+            try:
+                drive.check(one, joint, float(sampled[-1]))
+            except InputError as error:
+                raise InputError(f"drives[{joint!r}]: {error}") from None
+            drive.apply(simulation, joint)
+        for body, wrench in by_body.items():
+            wrench.apply(simulation, body)
+        simulations.append(simulation)
+    lead, rows = _members(given, len(models))
+    lead = lead if isinstance(model, Model) else (len(models), *lead)
+    count = int(np.prod(lead, dtype=np.int64))
+    _core.require_memory(
+        float(count) * sampled.size * schema.row_bytes,
+        f"{sampled.size} samples of {count} members",
+    )
+    columns = _core.simulate_members(
+        simulations,
+        q0=rows["q0"],
+        v0=rows["v0"],
+        tau=rows.get("tau"),
+        times=sampled,
+        quantities=schema.quantities,
+        threads=optional_count("threads", threads),
+    )
+    dataset = _dataset(columns, lead, schema, sampled, not isinstance(model, Model))
+    early = sum(outcome != "converged" for outcome in columns["outcome"])
+    attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)
+    attrs |= {"outcome": "converged" if not early else f"{early} of {count} members ended early"}
+    dataset = dataset.assign_attrs({name: plain(value) for name, value in attrs.items()})
+    if columns["interrupted"]:
+        raise SimulationInterrupted(
+            f"interrupted; {early} of {count} members are not complete", Run(dataset)
+        )
+    return dataset

@@ -1,0 +1,38 @@
+#pragma once
+// Many simulations of fixed step at once: members of one model share a group of SIMD lanes and an
+// integrator, groups are dealt out over threads. Grouping depends on the number of members alone,
+// and groups share nothing, so the number of threads does not change a bit.
+#include <functional>
+#include <span>
+#include <string_view>
+
+#include "linkwise/simulate/simulation.hpp"
+
+namespace linkwise {
+
+/// Arrays with a row a member, members of one simulation next to each other.
+struct BatchStart {
+  const double *q = nullptr, *v = nullptr;
+  const double* tau = nullptr;  ///< constant, beside the drives; null: none
+};
+
+/// How one member ended, and when.
+struct MemberEnd {
+  std::string_view outcome = "converged";
+  double time = 0;
+};
+
+/// InputError where a simulation has what a batch cannot do: an integrator that chooses its steps,
+/// functions of Python as drives.
+void check_batch(const Simulation& simulation);
+
+/// Simulates from time 0 on. Model, drives, wrenches and integrator are those of the simulations,
+/// each of which has `per_simulation` members; the method is articulated_body. Arrays of `samples`
+/// are [member][time][...], NaN after a member's end: a member that fails ends alone. `go_on` is
+/// asked at every step, from any thread; once it is false, members under way end as "interrupted".
+std::vector<MemberEnd> simulate_batch(std::span<const Simulation* const> simulations,
+                                      size_t per_simulation, const BatchStart& start,
+                                      std::span<const double> times, const Sample& samples,
+                                      int threads, const std::function<bool()>& go_on);
+
+}  // namespace linkwise
