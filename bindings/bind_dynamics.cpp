@@ -65,6 +65,9 @@ DynamicsOptions dynamics_options(const ForwardOptions& o) {
   return options;
 }
 
+/// What to bring back: accelerations alone, with joint loads, or everything there is to tell.
+enum class Wanted { accelerations, loads, full };
+
 /// Runs the chosen method on every system; force is [count][unknowns] when wanted.
 Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, const double* tau,
                    double gravity, double* du, double* loads, std::vector<double>* force,
@@ -112,8 +115,9 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
                             nb::handle external, bool passive, const std::string& method,
                             const std::string& solver, double tolerance, const std::string& stop,
                             int max_iterations, nb::handle solver_options, nb::handle threads,
-                            bool full, double gravity, nb::handle prescribed) {
+                            Wanted wanted, double gravity, nb::handle prescribed) {
   const Model& m = *self.model;
+  const bool full = wanted == Wanted::full, with_loads = wanted != Wanted::accelerations;
   States s(m, q, v, tau, "tau", external, prescribed);
   check_external(m, s);
   check_gravity(gravity);
@@ -147,13 +151,13 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
     other = own.get();
   }
   const double scratch_bytes = 8.0 * s.count * m.nv() * (passive || !s.tau.given);
-  const double result_bytes = 8.0 * s.count * (m.nv() + (full ? 6.0 * m.n_joints() : 0));
+  const double result_bytes = 8.0 * s.count * (m.nv() + (with_loads ? 6.0 * m.n_joints() : 0));
   if (scratch_bytes + result_bytes > worth_a_check)
     require_memory(scratch_bytes + result_bytes,
                    "forward dynamics of " + std::to_string(s.count) + " states");
   NewArray du(s.lead, {size(m.nv())});
   std::unique_ptr<NewArray> loads;
-  if (full) loads = std::make_unique<NewArray>(s.lead, Shape{size(m.n_joints()), 6});
+  if (with_loads) loads = std::make_unique<NewArray>(s.lead, Shape{size(m.n_joints()), 6});
   std::vector<double> passive_tau, force;
   Outcome outcome = Outcome::converged;
   Interrupt interrupt;
@@ -201,7 +205,7 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
   report.outcome = to_string(outcome);
   if (!full) {
     if (outcome != Outcome::converged) throw NumericsError(failure_text(m, report, outcome));
-    return du.array;
+    return with_loads ? loads->array : du.array;
   }
   ForwardResult result;
   result.acceleration = du.array;
@@ -248,14 +252,8 @@ nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
 nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
                        nb::handle external, bool passive, const std::string& method,
                        const std::string& solver, nb::handle threads) {
-  const nb::object result =
-      forward_dynamics(self, q, v, tau, external, passive, method, solver, 1e-12, "energy_norm", 0,
-                       nb::none(), threads, true, 1.0, nb::none());
-  const PyReport& report = nb::cast<PyReport&>(nb::cast<ForwardResult&>(result).report);
-  if (report.outcome != "converged")
-    throw NumericsError("method " + report.method + ": " + report.outcome +
-                        (report.body.empty() ? "" : " at body '" + report.body + "'"));
-  return nb::cast<ForwardResult&>(result).joint_load;
+  return forward_dynamics(self, q, v, tau, external, passive, method, solver, 1e-12, "energy_norm",
+                          0, nb::none(), threads, Wanted::loads, 1.0, nb::none());
 }
 
 nb::list solver_list() {
@@ -329,9 +327,18 @@ void bind_results(nb::module_& m) {
 void bind_dynamics(nb::module_& m) {
   bind_results(m);
   m.def(
-      "forward_dynamics", &forward_dynamics, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
-      nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
-      "solver"_a = "auto", "tolerance"_a = 1e-12, "stop"_a = "energy_norm", "max_iterations"_a = 0,
+      "forward_dynamics",
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
+         bool passive, const std::string& method, const std::string& solver, double tolerance,
+         const std::string& stop, int max_iterations, nb::handle solver_options, nb::handle threads,
+         bool full, double gravity, nb::handle prescribed) {
+        return forward_dynamics(self, q, v, tau, external, passive, method, solver, tolerance, stop,
+                                max_iterations, solver_options, threads,
+                                full ? Wanted::full : Wanted::accelerations, gravity, prescribed);
+      },
+      "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(), nb::kw_only(),
+      "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto", "solver"_a = "auto",
+      "tolerance"_a = 1e-12, "stop"_a = "energy_norm", "max_iterations"_a = 0,
       "solver_options"_a = nb::none(), "threads"_a = nb::none(), "full"_a = false,
       "gravity"_a = 1.0, "prescribed"_a = nb::none(),
       "Accelerations dv/dt (..., nv) [rad/s2, m/s2] of q (..., nq), v (..., nv), tau (..., nv); "

@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from linkwise import _core
@@ -101,6 +103,75 @@ def test_every_built_target_of_this_machine_imports_and_names_itself():
 def _usable(target):
     spec = _core.importlib.util.find_spec(f"linkwise._core_{target}")
     return spec is not None and not _core._unsupported(target)
+
+
+# -- what the other targets compute ----------------------------------------------------------------
+
+ROOT = Path(__file__).parents[2]
+OTHERS = [t for t in _core.TARGETS if _usable(t) and t != _core.cpu_target]
+CHECKED = ("test_properties.py", "test_batches.py", "test_threads.py", "test_batch_simulation.py")
+
+EVALUATE = """
+import sys
+import numpy as np
+import linkwise as lw
+
+rng = np.random.default_rng(4)
+found = {}
+for name, model in {
+    "chain": lw.scenes.chain(30, axes="random"),
+    "long chain": lw.scenes.chain(300, axes="random"),
+    "tree": lw.scenes.tree(63, axes="random"),
+    "spherical": lw.scenes.chain(5, joint="spherical"),
+    "arm": lw.scenes.srms(),
+}.items():
+    q = np.array([model.neutral_configuration()] * 19)
+    q += 0.3 * rng.standard_normal(q.shape)
+    v, tau = 0.3 * rng.standard_normal((2, 19, model.nv))
+    methods = ["articulated_body", "constraint_force", "composite_rigid_body"]
+    for method in methods[: 2 if model.nv > 100 else 3]:  # long mass matrices are ill-conditioned
+        result = lw.forward_dynamics(model, q, v, tau, method=method, full=True)
+        found[f"{name} {method} accelerations"] = result.acceleration
+        found[f"{name} {method} loads"] = result.joint_load
+    found[f"{name} torques"] = lw.inverse_dynamics(model, q, v, tau)
+    found[f"{name} one state"] = lw.forward_dynamics(model, q[0], v[0], tau[0])
+    run = lw.simulate_batch(model, q0=q, v0=v, duration=0.02, every=0.01, step=0.002)
+    found[f"{name} simulated"] = run.joint_load.values
+np.savez(sys.argv[1], **found)
+"""
+
+
+def in_target(target, *command):
+    return subprocess.run(
+        [sys.executable, *command],
+        env={**os.environ, "LINKWISE_CPU": target},
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+    )
+
+
+@pytest.mark.skipif(not OTHERS, reason="the build has one CPU target for this machine")
+@pytest.mark.parametrize("target", OTHERS)
+def test_the_kernels_tests_hold_for_every_target(target):
+    files = [str(Path(__file__).parent / name) for name in CHECKED]
+    done = in_target(target, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n0", *files)
+    assert done.returncode == 0, done.stdout[-4000:]
+    assert " passed" in done.stdout
+
+
+@pytest.mark.skipif(not OTHERS, reason="the build has one CPU target for this machine")
+@pytest.mark.parametrize("target", OTHERS)
+def test_targets_agree_to_rounding(target, tmp_path):
+    for name in (_core.cpu_target, target):
+        done = in_target(name, "-c", EVALUATE, str(tmp_path / f"{name}.npz"))
+        assert done.returncode == 0, done.stderr
+    here, there = (np.load(tmp_path / f"{name}.npz") for name in (_core.cpu_target, target))
+    assert set(here) == set(there)
+    for name in here:
+        scale = np.abs(here[name]).max()
+        assert scale > 0
+        np.testing.assert_allclose(there[name], here[name], rtol=0, atol=1e-9 * scale, err_msg=name)
 
 
 def test_public_names_are_those_of_the_compiled_module():
