@@ -279,6 +279,7 @@ nb::list method_list() {
     d["reference"] = std::string(e.reference);
     d["uses_solver"] = e.uses_solver;
     d["chains_only"] = e.chains_only;
+    d["linear_time"] = e.linear_time;
     out.append(d);
   }
   return out;

@@ -132,6 +132,7 @@ SimulationOptions options_of(const std::string& method, const std::string& solve
   if (!max_iterations.is_none())
     o.dynamics.solver_options.max_iterations = nb::cast<int>(max_iterations);
   read_solver_options(solver_options, o.dynamics);
+  o.follow_error_test = solver_tolerance.is_none() && !gives_tolerance(solver_options);
   o.state = state_choice_from_name(state);
   o.integrator = find_integrator(integrator).kind;
   o.integration.tolerance = tolerance;

@@ -116,6 +116,12 @@ void read_solver_options(nb::handle given, DynamicsOptions& options) {
                      "; give 1 or more");
 }
 
+bool gives_tolerance(nb::handle given) {
+  if (!nb::isinstance<nb::dict>(given)) return false;
+  const auto options = nb::cast<nb::dict>(given);
+  return options.contains("tolerance") || options.contains("absolute_tolerance");
+}
+
 nb::list solver_option_list() {
   nb::list out;
   const DynamicsOptions defaults;

@@ -10,6 +10,9 @@ namespace linkwise::bindings {
 /// made.
 void read_solver_options(nanobind::handle given, DynamicsOptions& options);
 
+/// Do they fix how accurate solutions are?
+bool gives_tolerance(nanobind::handle given);
+
 /// The keys with their defaults and meanings, as dictionaries.
 nanobind::list solver_option_list();
 

@@ -105,7 +105,7 @@ Field make_linkwise(const std::filesystem::path& folder) {
   plain.threads = 1;
   enter("auto", plain);
   for (const DynamicsEntry& method : dynamics_table()) {
-    if (method.name == "composite_rigid_body" && n > largest_for_mass_matrix) continue;
+    if (!method.linear_time && n > largest_for_mass_matrix) continue;
     DynamicsOptions options;
     options.threads = 1;
     options.method = method.name;

@@ -280,7 +280,7 @@ def _measure(
         row["outcome"] = "too slow"
         row["message"] = f"stopped after {time_limit:g} s"
     row["seconds"] = float(seconds[counted].mean())
-    if contestant.initial_guess:
+    if contestant.initial_guess or found["iterations"].any():
         row["mean_iterations"] = float(found["iterations"][counted].mean())
         row["max_iterations"] = int(found["iterations"][counted].max())
     row["error"] = _error(model, motion, found["acceleration"], expected)

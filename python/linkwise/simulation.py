@@ -187,14 +187,13 @@ def simulate(
         tolerance: Local error allowed a step, relative to the size of the state and absolute.
         integrator: "adams", "bdf", "runge_kutta_4" or "semi_implicit_euler"; the last two take
             fixed steps of `step` seconds.
-        method: How accelerations are computed: "auto", "constraint_force", "articulated_body" or
-            "composite_rigid_body".
-        solver: Linear solver of the constraint-force method: "auto", "thomas",
-            "conjugate_gradient".
+        method: How accelerations are computed: "auto", or one of linkwise.methods().
+        solver: Linear solver of the constraint-force method: "auto", or one of linkwise.solvers().
         initial_guess: Where an iterative solver starts: "zero", "previous", "linear", "cubic" or
             "projection".
         stop: Stopping test of an iterative solver: "energy_norm", "residual" or "paper".
-        solver_tolerance: What that test compares with; follows `tolerance` by default.
+        solver_tolerance: What that test compares with, relative to the solution; by default the
+            integrator's error test decides how accurate solutions have to be.
         max_iterations: Most iterations of one solution.
         solver_options: Further options of the solver by name, which go first:
             linkwise.solver_options() lists them.

@@ -13,7 +13,13 @@ from helpers.compare import assert_close, load_error
 from helpers.newton_euler import newton_euler
 from helpers.random_trees import random_configuration, random_rotation, trees
 
-METHODS = ["articulated_body", "composite_rigid_body", "constraint_force"]
+METHODS = [
+    "articulated_body",
+    "branch_recursion",
+    "composite_rigid_body",
+    "constraint_force",
+    "global_projection",
+]
 
 
 def state(tree, model):

@@ -4,28 +4,10 @@
 #include <new>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/kinematics/body_columns.hpp"
+#include "linkwise/spatial/composite.hpp"
 
 namespace linkwise {
-namespace {
-
-/// Free columns of a body's motion subspace, whatever its kind.
-int body_columns(const Model& model, int n, const std::vector<GeneralState<double>>& general,
-                 Motion<double>* P, int* dof) {
-  const BodyTopology& body = model.topology[n];
-  if (body.kind == BodyKind::general) {
-    const auto& g = general[body.general];
-    for (int i = 0; i < g.n; ++i) {
-      P[i] = g.P[i];
-      dof[i] = g.dof[i];
-    }
-    return g.n;
-  }
-  P[0] = element_column<double>(model.elements[body.first_element], 0);
-  dof[0] = body.v;
-  return 1;
-}
-
-}  // namespace
 
 CompositeRigidBody::CompositeRigidBody(const Model& model)
     : model_(&model),
@@ -72,17 +54,7 @@ void CompositeRigidBody::calc_columns(const double* q) {
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int n = model.n_bodies() - 1; n >= 0; --n) {
     const int parent = model.topology[n].parent;
-    if (parent >= 0) {
-      ArticulatedInertia<double> Y;
-      add_inertia(Y, composite_[n]);
-      const auto& X = state_[n].X;
-      const auto up = transform_to_parent(X, Y);
-      Inertia<double>& to = composite_[parent];
-      const Vec3<double> mc = transpose_times(X.R, composite_[n].mc) + composite_[n].m * X.r;
-      to.m += composite_[n].m;
-      to.mc += mc;
-      for (int i = 0; i < 6; ++i) to.I.m[i] += up.C.m[i];
-    }
+    if (parent >= 0) add_to_parent(state_[n].X, composite_[n], composite_[parent]);
     Motion<double> P[6], Pa[6];
     int dof[6], dof_a[6];
     const int n_own = body_columns(model, n, general_, P, dof);

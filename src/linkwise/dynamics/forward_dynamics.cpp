@@ -2,8 +2,11 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/articulated_body.hpp"
+#include "linkwise/dynamics/branch_recursion.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/constraint_force.hpp"
+#include "linkwise/dynamics/global_projection.hpp"
+#include "linkwise/dynamics/joint_space_conjugate_gradient.hpp"
 #include "linkwise/dynamics/piecewise.hpp"
 #include "linkwise/solve/registry.hpp"
 
@@ -34,27 +37,32 @@ std::unique_ptr<DynamicsMethod> make_recursion(const Model& model, const Dynamic
   return std::make_unique<Recursion<Kernel>>(model);
 }
 
-std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model,
-                                                      const DynamicsOptions& options) {
-  return std::make_unique<ConstraintForce>(model, options);
+template <class Method>
+std::unique_ptr<DynamicsMethod> make_method(const Model& model, const DynamicsOptions& options) {
+  return std::make_unique<Method>(model, options);
 }
 
-std::unique_ptr<DynamicsMethod> make_piecewise(const Model& model, const DynamicsOptions& options) {
-  return std::make_unique<Piecewise>(model, options);
-}
-
+// name, description, reference, uses a solver, chains only, linear time
 constexpr DynamicsEntry table[] = {
     {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false,
-     false, make_recursion<ArticulatedBody<double>>},
+     false, true, make_recursion<ArticulatedBody<double>>},
+    {"branch_recursion", "the same recursion, branches of a tree side by side on threads",
+     "hwang1988", false, false, true, make_method<BranchRecursion>},
     {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993",
-     true, false, make_constraint_force},
+     true, false, true, make_method<ConstraintForce>},
     {"piecewise",
      "one long revolute chain in pieces: recursion inside, constraint forces between, on lanes and "
      "threads",
-     "anderson2000", true, true, make_piecewise},
+     "anderson2000", true, true, true, make_method<Piecewise>},
     {"composite_rigid_body",
      "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)", "walker1982", false,
-     false, make_recursion<CompositeRigidBody>},
+     false, false, make_recursion<CompositeRigidBody>},
+    {"joint_space_conjugate_gradient",
+     "conjugate gradients on the joint-space mass matrix, one inverse dynamics an iteration",
+     "lee1988", false, false, false, make_method<JointSpaceConjugateGradient>},
+    {"global_projection",
+     "all bodies' motion equations projected on what the joints let through, O(N^3)", "hughes1985",
+     false, false, false, make_recursion<GlobalProjection>},
 };
 
 }  // namespace

@@ -45,6 +45,7 @@ struct DynamicsEntry {
   std::string_view reference;  ///< key in references.bib
   bool uses_solver;
   bool chains_only;  ///< takes one kind of machine only; the others take every tree
+  bool linear_time;  ///< the work grows as the number of bodies; the others are for short chains
   std::unique_ptr<DynamicsMethod> (*make)(const Model&, const DynamicsOptions&);
 };
 

@@ -109,12 +109,12 @@ LW_INLINE Force<S> user_wrench(const S* external, const JointInfo& joint, int in
   return transpose_times(joint.to_user, Force<S>{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
 }
 
-/// Fills states (and general for bodies of that kind). in.v may be null: resting.
+/// The states of a run of bodies, external wrenches left out; those of the parents must be there.
 template <class S>
-void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states,
-                      GeneralState<S>* general) {
+LW_INLINE void calc_run_states(const Model& model, const Run& run, const SweepInput<S>& in,
+                               BodyState<S>* states, GeneralState<S>* general) {
   const Motion<S> resting{};
-  for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+  dispatch_run(run, [&](auto joint, int begin, int end) {
     using J = decltype(joint);
     for (int n = begin; n < end; ++n) {
       const BodyTopology& body = model.topology[n];
@@ -136,6 +136,13 @@ void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>*
       s.bias = cross_dual(s.v, k.inertia * s.v);
     }
   });
+}
+
+/// Fills states (and general for bodies of that kind). in.v may be null: resting.
+template <class S>
+void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states,
+                      GeneralState<S>* general) {
+  for (const Run& run : model.runs) calc_run_states(model, run, in, states, general);
   if (!in.external) return;
   for (int j = 0; j < model.n_joints(); ++j)
     if (model.joints[j].last_of_body)

@@ -10,6 +10,7 @@
 #include "linkwise/dynamics/inverse_dynamics.hpp"
 #include "linkwise/forces/drive.hpp"
 #include "linkwise/integrate/integrator.hpp"
+#include "linkwise/simulate/solver_tolerance.hpp"
 
 namespace linkwise {
 
@@ -25,6 +26,9 @@ StateChoice state_choice_from_name(std::string_view name);
 struct SimulationOptions {
   DynamicsOptions dynamics;
   StateChoice state = StateChoice::joint_rates;
+  /// The energy-norm rule of an iterative solver follows the integrator's error test, where it has
+  /// one: see SolverTolerance. Otherwise its tolerance is that of the solver options.
+  bool follow_error_test = false;
   IntegratorKind integrator = IntegratorKind::adams;
   IntegratorOptions integration;
 };
@@ -106,6 +110,7 @@ class Simulation : private OdeSystem {
                      double* loads);
   template <class Evaluation>
   DynamicsReport traced(double t, Evaluation&& evaluation);
+  bool follows_error_test() const;
   bool accepts(double t, const DynamicsReport& report, const double* du, int n);
   void record_failure(double t, const DynamicsReport& report, const double* du);
   bool write_sample(double t, const Sample& sample);
@@ -120,10 +125,12 @@ class Simulation : private OdeSystem {
   std::vector<Drive> drives_;
   std::vector<Wrench> wrenches_;
   bool world_wrenches_ = false, any_motion_ = false;
+  /// Joint loads at output times are computed apart, to the fixed tolerance.
   std::unique_ptr<DynamicsMethod> method_, output_method_;
   std::unique_ptr<InverseDynamics<double>> inverse_;
   std::unique_ptr<Integrator> integrator_;
   std::unique_ptr<BodyVelocities> body_velocities_;
+  std::unique_ptr<SolverTolerance> solver_tolerance_;  ///< null: a fixed one
   std::vector<double> tau_, external_, poses_, y_, du_, holding_, rates_, imposed_, prescribed_;
   double drift_ = 0;
   long iterations_ = 0;

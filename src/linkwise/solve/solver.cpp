@@ -118,14 +118,6 @@ void validate(const SolverOptions& o) {
   if (o.lag_limit < 1) reject("lag_limit is " + std::to_string(o.lag_limit) + "; give 1 or more");
 }
 
-void LinearSolver::set_tolerance(double relative, double absolute) {
-  SolverOptions changed = options_;
-  changed.tolerance = relative;
-  changed.absolute_tolerance = absolute;
-  validate(changed);
-  options_ = changed;
-}
-
 void accumulate(Report& total, const Report& one) {
   total.iterations += one.iterations;
   if (!(one.error_estimate <= total.error_estimate)) total.error_estimate = one.error_estimate;

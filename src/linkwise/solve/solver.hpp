@@ -56,6 +56,12 @@ enum class RelaxationChoice {
 std::string_view to_string(RelaxationChoice choice);
 RelaxationChoice relaxation_choice_from_name(std::string_view name);
 
+/// What the energy-norm rule allows: ||x* - x||_A <= relative ||x*||_A + absolute.
+struct EnergyBound {
+  double relative = 0.0;
+  double absolute = 0.0;  ///< in the units of sqrt(x^T A x)
+};
+
 struct SolverOptions {
   /// Relative tolerance of the stop rule. A simulation passes a tenth of its own tolerance, as the
   /// paper and SUNDIALS do. Direct solvers ignore it.
@@ -63,6 +69,9 @@ struct SolverOptions {
   /// Added to the energy-norm rule's bound, in the units of sqrt(x^T A x): for constraint forces
   /// the square root of (twice the kinetic energy of an acceleration).
   double absolute_tolerance = 0.0;
+  /// Where given, the energy-norm rule reads it at every solve instead of the two tolerances: what
+  /// an integrator's error weights allow changes from step to step.
+  std::shared_ptr<const EnergyBound> energy_bound;
   /// 0: chosen by the solver from the number of unknowns.
   int max_iterations = 0;
   StopRule stop = StopRule::energy_norm;
@@ -111,9 +120,6 @@ class LinearSolver {
   /// factor once. The report holds the worst outcome and error and the sum of the iterations.
   virtual Report solve_many(const BlockTree& A, int count, std::span<const double> b,
                             std::span<double> x);
-
-  /// Changes the tolerances of an iterative solver between solves.
-  void set_tolerance(double relative, double absolute);
 
   const SolverOptions& options() const { return options_; }
 

@@ -20,6 +20,10 @@ void StopTest::start(const SolverOptions& options, const ScaledTree* scaling, in
   rule_ = options.stop;
   tolerance_ = options.tolerance;
   absolute_tolerance_ = options.absolute_tolerance;
+  if (rule_ == StopRule::energy_norm && options.energy_bound) {
+    tolerance_ = options.energy_bound->relative;
+    absolute_tolerance_ = options.energy_bound->absolute;
+  }
   right_hand_side_norm_ = 0.0;
   solution_energy_ = 0.0;
   smallest_eigenvalue_ = 1.0;

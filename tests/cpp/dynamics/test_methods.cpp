@@ -24,14 +24,14 @@ std::vector<DynamicsOptions> all_options(const Model& model) {
     if (!takes(entry, model)) continue;
     DynamicsOptions options;
     options.method = entry.name;
+    options.solver_options.tolerance = 1e-13;
+    options.solver_options.max_iterations = 100000;
     if (!entry.uses_solver) all.push_back(options);
     if (!entry.uses_solver) continue;
     for (const SolverEntry& solver : solver_table()) {
       if (solver.kind != SolverKind::direct && solver.name != "conjugate_gradient") continue;
       if (solver.chains_only && branches(model)) continue;
       options.solver = solver.name;
-      options.solver_options.tolerance = 1e-13;
-      options.solver_options.max_iterations = 100000;
       all.push_back(options);
     }
   }

@@ -99,6 +99,7 @@ inline void PrintTo(const Formulation& f, std::ostream* out) {
 }
 inline SimulationOptions with(SimulationOptions options, const Formulation& f) {
   options.dynamics.method = f.method;
+  options.dynamics.solver_options.tolerance = 1e-12;  // of the methods that iterate
   options.state = f.state;
   return options;
 }

@@ -95,9 +95,6 @@ TEST(Registry, OptionsOutOfRangeAreRejectedByName) {
   rejects("refinement_steps", [](SolverOptions& o) { o.refinement_steps = -1; });
   rejects("lag_limit", [](SolverOptions& o) { o.lag_limit = 0; });
   EXPECT_NE(complaint([] { make_initial_guess("projection", {.history = 0}); }), "(nothing)");
-  const auto solver = make_solver("conjugate_gradient");
-  EXPECT_NE(complaint([&] { solver->set_tolerance(-1.0, 0.0); }), "(nothing)");
-  EXPECT_EQ(solver->options().tolerance, SolverOptions().tolerance);
 }
 
 }  // namespace

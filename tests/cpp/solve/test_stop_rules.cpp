@@ -116,6 +116,30 @@ TEST(StopRules, AbsoluteToleranceIsInUnitsOfTheEnergyNorm) {
   EXPECT_LE(energy_error(dense, y, exact), 3e-3);
 }
 
+TEST(StopRules, AnEnergyBoundIsReadAtEverySolve) {
+  const BlockTree tree = rod_chain({RodJoint::revolute_alternating, true, 20});
+  const Dense dense = dense_twin(tree);
+  const std::vector<double> b = random_vector(tree.size(), 11);
+  const std::vector<double> exact = cholesky_solve(dense, b);
+  const auto bound = std::make_shared<EnergyBound>();
+  SolverOptions options;
+  options.energy_bound = bound;
+  const auto solver = make_solver("conjugate_gradient", options);
+  int previous = 0;
+  for (double relative : {1e-2, 1e-5, 1e-8}) {
+    *bound = {relative, 0.0};
+    std::vector<double> x(b.size(), 0.0);
+    const Report report = solver->solve(tree, b, x);
+    ASSERT_TRUE(report.ok());
+    EXPECT_LE(energy_error(dense, x, exact), 3 * relative);
+    EXPECT_GT(report.iterations, previous);
+    previous = report.iterations;
+  }
+  *bound = {0.0, 1e9};
+  std::vector<double> x(b.size(), 0.0);
+  EXPECT_LE(solver->solve(tree, b, x).iterations, 1);
+}
+
 TEST(Outcomes, IterationLimit) {
   SolverOptions options;
   options.max_iterations = 3;

@@ -1,0 +1,89 @@
+#include "linkwise/dynamics/mobility.hpp"
+
+#include <algorithm>
+
+namespace linkwise {
+namespace {
+
+Motion<double> operator*(const Matrix6<double>& W, const Force<double>& f) {
+  const Vector6<double> w = to_array(f);
+  Vector6<double> out{};
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) out[i] += W[6 * i + j] * w[j];
+  return to_motion(out.data());
+}
+
+/// X W X^T.
+Matrix6<double> transform_to_child(const Transform<double>& X, const Matrix6<double>& W) {
+  // Rows of the symmetric W are its columns: each pass moves one side and transposes.
+  const auto half = [&](const Matrix6<double>& in) {
+    Matrix6<double> out;
+    for (int i = 0; i < 6; ++i) {
+      const Vector6<double> column = to_array(X * to_motion(&in[6 * i]));
+      for (int j = 0; j < 6; ++j) out[6 * j + i] = column[j];
+    }
+    return out;
+  };
+  return half(half(W));
+}
+
+}  // namespace
+
+Mobility::Mobility(const Model& model)
+    : model_(&model),
+      columns_(model),
+      V_(columns_.count()),
+      D_inverse_(columns_.count()),
+      Y_(model.n_bodies()),
+      W_(model.n_bodies()),
+      diagonal_(model.nv()) {}
+
+std::span<const double> Mobility::evaluate(const double* q) {
+  SweepInput<double> in;
+  in.q = q;
+  columns_.update(in);
+  if (!tip_to_base()) return {};
+  base_to_tip();
+  return diagonal_;
+}
+
+bool Mobility::tip_to_base() {
+  const Model& model = *model_;
+  const std::vector<double>& armature = model.dof_values(DofProperty::armature);
+  std::fill(Y_.begin(), Y_.end(), ArticulatedInertia<double>{});
+  for (int n = model.n_bodies() - 1; n >= 0; --n) {
+    ArticulatedInertia<double>& Y = Y_[n];
+    add_inertia(Y, model.constants[n].inertia);
+    for (int k = columns_.first(n + 1) - 1; k >= columns_.first(n); --k) {
+      const Force<double> U = Y * columns_.P(k);
+      const double D = dot(columns_.P(k), U) + armature[columns_.dof(k)];
+      if (!(D > 0)) return false;
+      D_inverse_[k] = 1 / D;
+      V_[k] = {D_inverse_[k] * U.lin, D_inverse_[k] * U.ang};
+      subtract_outer(Y, V_[k], U);
+    }
+    const int parent = model.topology[n].parent;
+    if (parent >= 0) Y_[parent] += transform_to_parent(columns_.state(n).X, Y);
+  }
+  return true;
+}
+
+void Mobility::base_to_tip() {
+  const Model& model = *model_;
+  for (int n = 0; n < model.n_bodies(); ++n) {
+    Matrix6<double>& W = W_[n];
+    const int parent = model.topology[n].parent;
+    W = parent >= 0 ? transform_to_child(columns_.state(n).X, W_[parent]) : Matrix6<double>{};
+    for (int k = columns_.first(n); k < columns_.first(n + 1); ++k) {
+      const Motion<double> given = W * V_[k];
+      const double mobility = D_inverse_[k] + dot(given, V_[k]);
+      diagonal_[columns_.dof(k)] = mobility;
+      const Vector6<double> p = to_array(columns_.P(k)), g = to_array(given);
+      for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j)
+          W[6 * i + j] += mobility * p[i] * p[j] - p[i] * g[j] - g[i] * p[j];
+    }
+  }
+}
+
+}  // namespace linkwise
