@@ -27,7 +27,7 @@ LAYERS = {
     "model": BASE | {"spatial", "joints"},
     "kinematics": BASE | {"spatial", "joints", "model"},
     "forces": BASE | {"spatial", "joints", "model", "kinematics"},
-    "constraint": BASE | {"spatial", "joints", "model", "kinematics", "forces", "linear"},
+    "constraint": BASE | {"exec", "linear", "spatial", "joints", "model", "kinematics", "forces"},
     "dynamics": NUMERICS | MECHANICS,
     "integrate": BASE | {"exec"},
     "simulate": NUMERICS | MECHANICS | {"dynamics", "integrate"},

@@ -19,7 +19,6 @@ STATES = 20
 TOLERANCE = 1e-9
 METHODS = {
     "articulated_body": {},
-    "branch_recursion": {},
     "composite_rigid_body": {},
     "constraint_force": {"solver": "thomas"},
     "global_projection": {},

@@ -15,7 +15,6 @@ from helpers.random_trees import random_configuration, random_rotation, trees
 
 METHODS = [
     "articulated_body",
-    "branch_recursion",
     "composite_rigid_body",
     "constraint_force",
     "global_projection",

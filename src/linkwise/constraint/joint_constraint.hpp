@@ -8,20 +8,43 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linkwise/base/error.hpp"
 #include "linkwise/kinematics/body_state.hpp"
 #include "linkwise/spatial/matrix6.hpp"
 
 namespace linkwise {
 
+template <class S>
 struct JointConstraint {
-  int rows = 0;             ///< columns of B, 0 to 6
-  int free = 0;             ///< degrees of freedom
-  int dof[6];               ///< their indices in v
-  Vector6<double> B[6];     ///< column by column
-  double compliance[6];     ///< 1 / armature, or 0
-  int armature_of[6];       ///< column -> degree of freedom index in v, or -1
-  Vector6<double> dual[6];  ///< P^+T: du_i = dual_i . (a_n - X a_p - c)
+  int rows = 0;          ///< columns of B, 0 to 6
+  int free = 0;          ///< degrees of freedom
+  int dof[6];            ///< their indices in v
+  Vector6<S> B[6];       ///< column by column
+  double compliance[6];  ///< 1 / armature, or 0
+  int armature_of[6];    ///< column -> degree of freedom index in v, or -1
+  Vector6<S> dual[6];    ///< P^+T: du_i = dual_i . (a_n - X a_p - c)
 };
+
+/// InputError naming the first body whose inertia is singular: it has no compliance.
+inline void require_regular_inertias(const Model& model) {
+  if (const int body = model.singular_body(); body >= 0)
+    throw InputError("body '" + model.body_name(body) + "'" + model.where() +
+                     " has a singular inertia, which method constraint_force cannot take; give it "
+                     "mass and inertia about every axis, or use method articulated_body");
+}
+
+/// Columns of B of body n: what its joint constrains or drives through a rotor.
+inline int constraint_rows(const Model& model, int n) {
+  const BodyTopology& body = model.topology[n];
+  const auto& armature = model.dof_values(DofProperty::armature);
+  int rows = 6;
+  for (int i = 0; i < body.n_elements; ++i) {
+    const Element& e = model.elements[body.first_element + i];
+    for (int k = 0; k < e.nv; ++k)
+      if (!e.prescribed && !(armature[e.v + k] > 0)) --rows;
+  }
+  return rows;
+}
 
 /// Complement by Householder reflections of the columns of P; n <= 6 of full rank.
 inline void householder_complement(const Motion<double>* P, int n, Vector6<double>* dual,
@@ -132,7 +155,8 @@ inline bool separate_complement(const Motion<double>* P, int n, Vector6<double>*
 
 /// P as columns: one for a one-axis joint.
 inline void calc_joint_constraint(const Motion<double>* P, const int* dof, int n,
-                                  const std::vector<double>& armature, JointConstraint& out) {
+                                  const std::vector<double>& armature,
+                                  JointConstraint<double>& out) {
   Vector6<double> complement[6];
   out.free = n;
   out.rows = 0;
@@ -149,6 +173,32 @@ inline void calc_joint_constraint(const Motion<double>* P, const int* dof, int n
     out.B[out.rows] = complement[i];
     out.compliance[out.rows] = 0;
     out.armature_of[out.rows++] = -1;
+  }
+}
+
+/// Lane by lane: the columns are chosen by comparisons.
+template <class S>
+void calc_joint_constraint(const Motion<S>* P, const int* dof, int n,
+                           const std::vector<double>& armature, JointConstraint<S>& out) {
+  for (int l = 0; l < lane_count<S>; ++l) {
+    Motion<double> columns[6];
+    for (int i = 0; i < n; ++i) {
+      const Vector6<S> column = to_array(P[i]);
+      Vector6<double> one;
+      for (int r = 0; r < 6; ++r) one[r] = lane(column[r], l);
+      columns[i] = to_motion(one.data());
+    }
+    JointConstraint<double> one;
+    calc_joint_constraint(columns, dof, n, armature, one);
+    out.rows = one.rows;
+    out.free = one.free;
+    std::copy(one.dof, one.dof + one.free, out.dof);
+    std::copy(one.compliance, one.compliance + one.rows, out.compliance);
+    std::copy(one.armature_of, one.armature_of + one.rows, out.armature_of);
+    for (int r = 0; r < 6; ++r) {
+      for (int i = 0; i < one.rows; ++i) set_lane(out.B[i][r], l, one.B[i][r]);
+      for (int i = 0; i < one.free; ++i) set_lane(out.dual[i][r], l, one.dual[i][r]);
+    }
   }
 }
 

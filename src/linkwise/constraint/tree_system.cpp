@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "linkwise/base/error.hpp"
+#include "linkwise/exec/sections.hpp"
 
 namespace linkwise {
 
-TreeSystem::TreeSystem(const Model& model)
+TreeSystem::TreeSystem(const Model& model, int threads)
     : model_(&model),
+      threads_(threads),
       state_(model.n_bodies()),
       general_(model.n_general),
       joint_(model.n_bodies()),
@@ -16,24 +17,14 @@ TreeSystem::TreeSystem(const Model& model)
       g_(model.n_bodies()),
       w_(model.n_bodies()),
       a_(model.n_bodies()) {
-  if (const int body = model.singular_body(); body >= 0)
-    throw InputError("body '" + model.body_name(body) + "'" + model.where() +
-                     " has a singular inertia, which method constraint_force cannot take; give it "
-                     "mass and inertia about every "
-                     "axis, or use method articulated_body");
+  require_regular_inertias(model);
   std::vector<int> parent, dim;
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int n = 0; n < model.n_bodies(); ++n) {
     compliance_.push_back(invert_inertia(model.constants[n].inertia));
     const BodyTopology& body = model.topology[n];
-    int rows = 6;
-    for (int i = 0; i < body.n_elements; ++i) {
-      const Element& e = model.elements[body.first_element + i];
-      for (int k = 0; k < e.nv; ++k)
-        if (!e.prescribed && !(armature[e.v + k] > 0)) --rows;
-    }
     parent.push_back(body.parent);
-    dim.push_back(rows);
+    dim.push_back(constraint_rows(model, n));
     // One-axis joints have a constant B; the others are filled in at every assembly.
     if (body.kind != BodyKind::general) {
       const Motion<double> P = element_column<double>(model.elements[body.first_element], 0);
@@ -60,7 +51,7 @@ void TreeSystem::calc_free_accelerations(const SweepInput<double>& in) {
   for (int n = 0; n < model.n_bodies(); ++n) g_[n] = {-state_[n].bias.lin, -state_[n].bias.ang};
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int n = 0; n < model.n_bodies(); ++n) {
-    const JointConstraint& joint = joint_[n];
+    const JointConstraint<double>& joint = joint_[n];
     Vector6<double> known{};
     for (int i = 0; i < joint.free; ++i) {
       if (armature[joint.dof[i]] > 0) continue;
@@ -76,7 +67,7 @@ void TreeSystem::calc_free_accelerations(const SweepInput<double>& in) {
 
 void TreeSystem::assemble_node(int n, const SweepInput<double>& in) {
   const Model& model = *model_;
-  const JointConstraint& joint = joint_[n];
+  const JointConstraint<double>& joint = joint_[n];
   const int parent = model.topology[n].parent, rows = joint.rows;
   const Transform<double>& X = state_[n].X;
   const auto& armature = model.dof_values(DofProperty::armature);
@@ -127,7 +118,7 @@ void TreeSystem::assemble_node(int n, const SweepInput<double>& in) {
       for (int i = 0; i < 6; ++i) H[block_stride * r + i] = row[i];
     }
   } else if (parent >= 0) {
-    const JointConstraint& inboard = joint_[parent];
+    const JointConstraint<double>& inboard = joint_[parent];
     Block& L = A_.parent_block[n];
     for (int r = 0; r < rows; ++r) {
       Vector6<double> y{};
@@ -165,7 +156,7 @@ double TreeSystem::calc_joint_rates(const double* q, std::span<const Motion<doub
       for (int i = 0; i < 6; ++i) sum += direction[i] * gap[i];
       return sum;
     };
-    const JointConstraint& joint = joint_[n];
+    const JointConstraint<double>& joint = joint_[n];
     for (int i = 0; i < joint.free; ++i) u[joint.dof[i]] = component(joint.dual[i]);
     for (int r = 0; r < joint.rows; ++r)
       if (joint.armature_of[r] < 0) drift = std::max(drift, std::abs(component(joint.B[r])));
@@ -200,10 +191,12 @@ void TreeSystem::assemble_at(const SweepInput<double>& in, std::span<const Motio
 
 void TreeSystem::assemble_rows(const SweepInput<double>& in) {
   calc_free_accelerations(in);
-  for (int n = 0; n < model_->n_bodies(); ++n) assemble_node(n, in);
+  Sections(model_->n_bodies(), SectionOf::nodes).for_each(threads_, [&](int, int begin, int end) {
+    for (int n = begin; n < end; ++n) assemble_node(n, in);
+  });
   for (BlockTree::Hub& hub : A_.hubs) {
     hub.compliance = to_matrix(compliance_[hub.node]);
-    const JointConstraint& joint = joint_[hub.node];
+    const JointConstraint<double>& joint = joint_[hub.node];
     for (int r = 0; r < joint.rows; ++r)
       for (int i = 0; i < 6; ++i) hub.inboard[block_stride * r + i] = joint.B[r][i];
   }

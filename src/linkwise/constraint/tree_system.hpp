@@ -16,7 +16,8 @@ namespace linkwise {
 class TreeSystem {
  public:
   /// InputError naming the body when one has a singular inertia.
-  explicit TreeSystem(const Model& model);
+  /// `threads` share the rows; they influence no result.
+  explicit TreeSystem(const Model& model, int threads = 1);
 
   const BlockTree& A() const { return A_; }
   const std::vector<double>& b() const { return b_; }
@@ -47,12 +48,13 @@ class TreeSystem {
   void assemble_node(int n, const SweepInput<double>& in);
 
   const Model* model_;
+  int threads_;
   BlockTree A_;
   std::vector<double> b_;
   std::vector<Compliance<double>> compliance_;
   std::vector<BodyState<double>> state_;
   std::vector<GeneralState<double>> general_;
-  std::vector<JointConstraint> joint_;
+  std::vector<JointConstraint<double>> joint_;
   std::vector<Force<double>> known_, g_, w_;
   std::vector<Motion<double>> a_;
   double violation_ = 0;

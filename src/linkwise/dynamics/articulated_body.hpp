@@ -5,9 +5,15 @@
 // Ours differs in the joint frame along z, which makes U a column and D a number for one-axis
 // joints, in the placements of hinges (hinge.hpp) with the zeros that their elimination leaves, and
 // in running on lanes. The joint load falls out of the outward sweep: w_n = Ya X a_p + pa.
+#include <algorithm>
+#include <atomic>
+#include <functional>
+#include <memory>
 #include <vector>
 
+#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/kinematics/body_state.hpp"
+#include "linkwise/kinematics/branches.hpp"
 #include "linkwise/spatial/hinge.hpp"
 
 namespace linkwise {
@@ -30,15 +36,14 @@ class ArticulatedBody {
   bool evaluate(const SweepInput<S>& in, S* du, S* loads) {
     failed_body_ = -1;
     if (loads && eliminated_.empty()) eliminated_.resize(model_->n_bodies());
-    calc_velocities(in);
-    if (loads)
-      tip_to_base<true>(in);
-    else
-      tip_to_base<false>(in);
-    if (loads)
-      base_to_tip<true>(in, du);
-    else
-      base_to_tip<false>(in, du);
+    if (branches_ && !branches_->shares.empty()) {
+      evaluate_branches(in, du, loads);
+    } else {
+      calc_velocities(in, model_->runs);
+      add_external(in);
+      tip_to_base(in, model_->runs, loads);
+      base_to_tip(in, model_->runs, du, loads);
+    }
     if (loads)
       store_joint_loads(
           *model_, in.q, [&](int n) -> const Force<S>& { return body_[n].U; }, loads);
@@ -47,8 +52,25 @@ class ArticulatedBody {
 
   int failed_body() const { return failed_body_; }
 
+  /// From now on the branches of a large tree are shared by threads, which influence no result.
+  void share_branches(int threads) {
+    branches_ = std::make_unique<Branches>(*model_);
+    threads_ = threads;
+    if (branches_->shares.empty()) return;
+    given_of_.assign(model_->n_bodies(), -1);
+    for (const Run& run : branches_->trunk)
+      std::fill(given_of_.begin() + run.begin, given_of_.begin() + run.end, in_trunk);
+    for (const auto& share : branches_->shares)
+      for (const int root : share.roots)
+        if (model_->topology[root].parent >= 0) {
+          given_of_[root] = static_cast<int>(given_.size());
+          given_.push_back({});
+        }
+  }
+
  private:
   static constexpr double smallest_pivot = 1e-13;
+  static constexpr int in_trunk = -2;
   struct BodyWork {
     Motion<S> v;              ///< velocity, then acceleration
     Force<S> p;               ///< bias wrench, children's share added tip to base
@@ -79,10 +101,47 @@ class ArticulatedBody {
       return pose_[n] * v;
   }
 
-  void calc_velocities(const SweepInput<S>& in) {
+  /// Trunk and branches [hwang1988]; what the branches give to the trunk is added in their order.
+  void evaluate_branches(const SweepInput<S>& in, S* du, S* loads) {
+    const auto each = [&](auto&& sweep) {
+      const auto task = [&](int i) { sweep(branches_->shares[i].runs); };
+      parallel_for(static_cast<int>(branches_->shares.size()), threads_, std::ref(task));
+    };
+    calc_velocities(in, branches_->trunk);
+    each([&](const std::vector<Run>& runs) { calc_velocities(in, runs); });
+    add_external(in);
+    each([&](const std::vector<Run>& runs) { tip_to_base(in, runs, loads); });
+    for (const Run& run : branches_->trunk)
+      for (int n = run.begin; n < run.end; ++n) body_[n].Y = {};
+    for (const auto& share : branches_->shares)
+      for (const int root : share.roots)
+        if (given_of_[root] >= 0) {
+          BodyWork& parent = body_[model_->topology[root].parent];
+          parent.Y += given_[given_of_[root]].Y;
+          parent.p += given_[given_of_[root]].p;
+        }
+    tip_to_base(in, branches_->trunk, loads);
+    base_to_tip(in, branches_->trunk, du, loads);
+    each([&](const std::vector<Run>& runs) { base_to_tip(in, runs, du, loads); });
+  }
+
+  void tip_to_base(const SweepInput<S>& in, const std::vector<Run>& runs, const S* loads) {
+    if (loads)
+      tip_to_base<true>(in, runs);
+    else
+      tip_to_base<false>(in, runs);
+  }
+  void base_to_tip(const SweepInput<S>& in, const std::vector<Run>& runs, S* du, const S* loads) {
+    if (loads)
+      base_to_tip<true>(in, runs, du);
+    else
+      base_to_tip<false>(in, runs, du);
+  }
+
+  void calc_velocities(const SweepInput<S>& in, const std::vector<Run>& runs) {
     const Model& model = *model_;
     const Motion<S> resting{};
-    for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+    for_runs_base_to_tip(runs, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];
@@ -107,14 +166,18 @@ class ArticulatedBody {
         w.p = cross_dual(w.v, k.inertia * w.v);
       }
     });
-    if (!in.external) return;
-    for (int j = 0; j < model.n_joints(); ++j)
-      if (model.joints[j].last_of_body)
-        body_[model.joints[j].body].p -= user_wrench(in.external, model.joints[j], j);
   }
 
-  LW_INLINE void give_to_parent(const BodyTopology& body, const ArticulatedInertia<S>& Y,
+  void add_external(const SweepInput<S>& in) {
+    if (!in.external) return;
+    for (int j = 0; j < model_->n_joints(); ++j)
+      if (model_->joints[j].last_of_body)
+        body_[model_->joints[j].body].p -= user_wrench(in.external, model_->joints[j], j);
+  }
+
+  LW_INLINE void give_to_parent(int n, const BodyTopology& body, const ArticulatedInertia<S>& Y,
                                 const Force<S>& p) {
+    if (__builtin_expect(!given_of_.empty(), 0)) return give_among_branches(n, body, Y, p);
     BodyWork& parent = body_[body.parent];
     if (body.first_to_give)
       parent.Y = Y;
@@ -123,10 +186,25 @@ class ArticulatedBody {
     parent.p += p;
   }
 
+  void give_among_branches(int n, const BodyTopology& body, const ArticulatedInertia<S>& Y,
+                           const Force<S>& p) {
+    if (given_of_[n] >= 0) {
+      given_[given_of_[n]] = {Y, p};
+      return;
+    }
+    BodyWork& parent = body_[body.parent];
+    // To a body of the trunk the branches have given before.
+    if (body.first_to_give && given_of_[n] != in_trunk)
+      parent.Y = Y;
+    else
+      parent.Y += Y;
+    parent.p += p;
+  }
+
   template <bool with_loads>
-  void tip_to_base(const SweepInput<S>& in) {
+  void tip_to_base(const SweepInput<S>& in, const std::vector<Run>& runs) {
     const Model& model = *model_;
-    for_runs_tip_to_base(model, [&](auto joint, int begin, int end) {
+    for_runs_tip_to_base(runs, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = end - 1; n >= begin; --n) {
         const BodyTopology& body = model.topology[n];
@@ -168,7 +246,7 @@ class ArticulatedBody {
     p += Force<S>{u * V.lin, u * V.ang};
     if constexpr (with_loads) eliminated_[n] = {Y, p};
     if (body.parent >= 0)
-      give_to_parent(body, transform_to_parent(pose_[n], Y), transpose_times(pose_[n], p));
+      give_to_parent(n, body, transform_to_parent(pose_[n], Y), transpose_times(pose_[n], p));
   }
 
   template <class J, bool with_loads>
@@ -213,16 +291,23 @@ class ArticulatedBody {
     if (body.parent < 0) return;
     if constexpr (J::is_hinge) {
       const auto k = placement(model_->constants[n]);
-      give_to_parent(body, to_parent(k, body_[n].cosine, body_[n].sine, Z),
+      give_to_parent(n, body, to_parent(k, body_[n].cosine, body_[n].sine, Z),
                      to_parent(k, body_[n].cosine, body_[n].sine, p));
     } else {
-      give_to_parent(body, transform_to_parent(pose_[n], Z), transpose_times(pose_[n], p));
+      give_to_parent(n, body, transform_to_parent(pose_[n], Z), transpose_times(pose_[n], p));
     }
   }
 
   LW_INLINE void check(S D, int n) {
     for (int i = 0; i < lane_count<S>; ++i)
-      if (__builtin_expect(!(lane(D, i) > 0), 0) && failed_body_ < 0) failed_body_ = n;
+      if (__builtin_expect(!(lane(D, i) > 0), 0)) fail(n);
+  }
+
+  /// Of several the outermost is named, whichever thread finds one first.
+  void fail(int n) {
+    int known = failed_body_;
+    while (known < n && !failed_body_.compare_exchange_weak(known, n)) {
+    }
   }
 
   template <bool with_loads>
@@ -270,14 +355,14 @@ class ArticulatedBody {
     for (int i = 0; i < g.n; ++i) p += Force<S>{z[i] * W[i].lin, z[i] * W[i].ang};
     if constexpr (with_loads) eliminated_[n] = {Y, p};
     if (body.parent >= 0)
-      give_to_parent(body, transform_to_parent(pose_[n], Y), transpose_times(pose_[n], p));
+      give_to_parent(n, body, transform_to_parent(pose_[n], Y), transpose_times(pose_[n], p));
   }
 
   template <bool with_loads>
-  void base_to_tip(const SweepInput<S>& in, S* du) {
+  void base_to_tip(const SweepInput<S>& in, const std::vector<Run>& runs, S* du) {
     const Model& model = *model_;
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
-    for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+    for_runs_base_to_tip(runs, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];
@@ -356,7 +441,11 @@ class ArticulatedBody {
   std::vector<Eliminated> eliminated_;  ///< made when loads are first asked for
   std::vector<GeneralState<S>> general_;
   std::vector<GeneralWork> general_body_;
-  int failed_body_ = -1;
+  std::atomic<int> failed_body_ = -1;
+  std::unique_ptr<Branches> branches_;  ///< made where threads may share them
+  int threads_ = 1;
+  std::vector<int> given_of_;      ///< root of a branch -> index into given_; in_trunk; else -1
+  std::vector<Eliminated> given_;  ///< to the trunk
 };
 
 }  // namespace linkwise

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "linkwise/dynamics/articulated_body.hpp"
+#include "linkwise/dynamics/constraint_elimination.hpp"
 #include "linkwise/dynamics/inverse_dynamics.hpp"
 
 namespace linkwise {
@@ -11,17 +12,19 @@ namespace linkwise {
 struct BatchEvaluator::Work {
   explicit Work(const Model& model) : model_(&model) {}
 
-  int forward_dynamics(size_t count, const BatchInput& in, double* du, double* loads) {
+  template <class Scalar, class OnLanes>
+  int forward_dynamics(std::unique_ptr<Scalar>& scalar, std::unique_ptr<OnLanes>& on_lanes,
+                       size_t count, const BatchInput& in, double* du, double* loads) {
     int failed = -1;
     over_groups(
         count, in,
         [&](const SweepInput<double>& one, size_t i) {
-          auto& kernel = made(forward_);
+          auto& kernel = made(scalar);
           if (!kernel.evaluate(one, du + i * nv(), loads ? loads + i * n_load() : nullptr))
             failed = kernel.failed_body();
         },
         [&](const SweepInput<Group>& group, size_t i) {
-          auto& kernel = made(forward_lanes_);
+          auto& kernel = made(on_lanes);
           if (!kernel.evaluate(group, out_a(), loads ? out_b() : nullptr))
             failed = kernel.failed_body();
           unpack(out_a(), nv(), i, count, du);
@@ -46,9 +49,13 @@ struct BatchEvaluator::Work {
         });
   }
 
- private:
   using Group = Lanes<native_lanes>;
+  std::unique_ptr<ArticulatedBody<double>> articulated;
+  std::unique_ptr<ArticulatedBody<Group>> articulated_lanes;
+  std::unique_ptr<ConstraintElimination<double>> elimination;
+  std::unique_ptr<ConstraintElimination<Group>> elimination_lanes;
 
+ private:
   size_t nq() const { return model_->nq(); }
   size_t nv() const { return model_->nv(); }
   size_t n_load() const { return 6 * static_cast<size_t>(model_->n_joints()); }
@@ -112,8 +119,6 @@ struct BatchEvaluator::Work {
   }
 
   const Model* model_;
-  std::unique_ptr<ArticulatedBody<double>> forward_;
-  std::unique_ptr<ArticulatedBody<Group>> forward_lanes_;
   std::unique_ptr<InverseDynamics<double>> inverse_;
   std::unique_ptr<InverseDynamics<Group>> inverse_lanes_;
   std::vector<Group> q_, v_, tau_, du_, external_, out_a_, out_b_;
@@ -122,9 +127,12 @@ struct BatchEvaluator::Work {
 BatchEvaluator::BatchEvaluator(const Model& model) : work_(std::make_unique<Work>(model)) {}
 BatchEvaluator::~BatchEvaluator() = default;
 
-int BatchEvaluator::forward_dynamics(size_t count, const BatchInput& in, double* du,
-                                     double* loads) {
-  return work_->forward_dynamics(count, in, du, loads);
+int BatchEvaluator::forward_dynamics(size_t count, const BatchInput& in, double* du, double* loads,
+                                     BatchMethod method) {
+  Work& w = *work_;
+  return method == BatchMethod::constraint_force
+             ? w.forward_dynamics(w.elimination, w.elimination_lanes, count, in, du, loads)
+             : w.forward_dynamics(w.articulated, w.articulated_lanes, count, in, du, loads);
 }
 
 void BatchEvaluator::inverse_dynamics(size_t count, const BatchInput& in, double* tau,

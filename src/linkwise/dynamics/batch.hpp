@@ -17,6 +17,9 @@ struct BatchInput {
   double gravity_factor = 1;
 };
 
+/// The methods that run on lanes.
+enum class BatchMethod { articulated_body, constraint_force };
+
 /// One worker's scratch: everything is allocated at the first use of its kind.
 class BatchEvaluator {
  public:
@@ -25,7 +28,8 @@ class BatchEvaluator {
 
   /// du [count][nv]; loads [count][n_joints][6] or null. Returns the body at which a system's
   /// elimination failed, or -1.
-  int forward_dynamics(size_t count, const BatchInput& in, double* du, double* loads);
+  int forward_dynamics(size_t count, const BatchInput& in, double* du, double* loads,
+                       BatchMethod method = BatchMethod::articulated_body);
 
   /// tau [count][nv] and loads [count][n_joints][6]; either may be null.
   void inverse_dynamics(size_t count, const BatchInput& in, double* tau, double* loads);

@@ -1,13 +1,23 @@
 #include "linkwise/dynamics/constraint_force.hpp"
 
+#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
 
+namespace {
+
+SolverOptions with_threads(SolverOptions options, int threads) {
+  options.threads = checked_threads(threads);
+  return options;
+}
+
+}  // namespace
+
 ConstraintForce::ConstraintForce(const Model& model, const DynamicsOptions& options)
     : model_(&model),
-      system_(model),
-      solver_(make_solver(options.solver, options.solver_options)),
+      system_(model, checked_threads(options.threads)),
+      solver_(make_solver(options.solver, with_threads(options.solver_options, options.threads))),
       guess_(make_initial_guess(options.initial_guess, {options.history})),
       f_(system_.A().size()),
       direct_(find_solver(options.solver).kind == SolverKind::direct) {}

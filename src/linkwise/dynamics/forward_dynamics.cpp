@@ -2,12 +2,13 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/articulated_body.hpp"
-#include "linkwise/dynamics/branch_recursion.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
+#include "linkwise/dynamics/constraint_elimination.hpp"
 #include "linkwise/dynamics/constraint_force.hpp"
 #include "linkwise/dynamics/global_projection.hpp"
 #include "linkwise/dynamics/joint_space_conjugate_gradient.hpp"
 #include "linkwise/dynamics/piecewise.hpp"
+#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
@@ -28,6 +29,8 @@ class Recursion : public DynamicsMethod {
     return report;
   }
 
+  Kernel& kernel() { return kernel_; }
+
  private:
   Kernel kernel_;
 };
@@ -42,14 +45,50 @@ std::unique_ptr<DynamicsMethod> make_method(const Model& model, const DynamicsOp
   return std::make_unique<Method>(model, options);
 }
 
+/// The system eliminated as it is assembled: what "thomas" stands for unless more than the solution
+/// is asked of the solver.
+class FusedConstraintForce : public DynamicsMethod {
+ public:
+  explicit FusedConstraintForce(const Model& model) : kernel_(model) {
+    f_.resize(kernel_.n_unknowns());
+  }
+  DynamicsReport evaluate(double, const SweepInput<double>& in, double* du,
+                          double* loads) override {
+    DynamicsReport report;
+    if (!kernel_.evaluate(in, du, loads, f_.data())) {
+      report.outcome = Outcome::not_positive_definite;
+      report.body = kernel_.failed_body();
+    }
+    return report;
+  }
+  std::span<const double> constraint_force() const override { return f_; }
+
+ private:
+  ConstraintElimination<double> kernel_;
+  std::vector<double> f_;
+};
+
+std::unique_ptr<DynamicsMethod> make_articulated_body(const Model& model,
+                                                      const DynamicsOptions& options) {
+  auto method = std::make_unique<Recursion<ArticulatedBody<double>>>(model);
+  method->kernel().share_branches(checked_threads(options.threads));
+  return method;
+}
+
+std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model,
+                                                      const DynamicsOptions& options) {
+  const SolverOptions& asked = options.solver_options;
+  if (options.solver == "thomas" && asked.refinement_steps == 0 && !asked.estimate_error)
+    return std::make_unique<FusedConstraintForce>(model);
+  return std::make_unique<ConstraintForce>(model, options);
+}
+
 // name, description, reference, uses a solver, chains only, linear time
 constexpr DynamicsEntry table[] = {
     {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false,
-     false, true, make_recursion<ArticulatedBody<double>>},
-    {"branch_recursion", "the same recursion, branches of a tree side by side on threads",
-     "hwang1988", false, false, true, make_method<BranchRecursion>},
+     false, true, make_articulated_body},
     {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993",
-     true, false, true, make_method<ConstraintForce>},
+     true, false, true, make_constraint_force},
     {"piecewise",
      "one long revolute chain in pieces: recursion inside, constraint forces between, on lanes and "
      "threads",

@@ -93,7 +93,8 @@ DynamicsReport JointSpaceConjugateGradient::evaluate(double, const SweepInput<do
         [this](std::span<const double> r, std::span<double> z) -> std::span<const double> {
           for (size_t k = 0; k < r.size(); ++k) z[k] = inverse_diagonal_[k] * r[k];
           return z;
-        });
+        },
+        options_.threads);
     static_cast<Report&>(report) = {stop_.outcome(), stop_.iterations(), stop_.relative_error(),
                                     -1};
   }

@@ -60,12 +60,20 @@ LW_INLINE void dispatch_run(const Run& run, F&& f) {
   }
 }
 template <class F>
+LW_INLINE void for_runs_base_to_tip(const std::vector<Run>& runs, F&& f) {
+  for (const Run& run : runs) dispatch_run(run, f);
+}
+template <class F>
 LW_INLINE void for_runs_base_to_tip(const Model& model, F&& f) {
-  for (const Run& run : model.runs) dispatch_run(run, f);
+  for_runs_base_to_tip(model.runs, f);
+}
+template <class F>
+LW_INLINE void for_runs_tip_to_base(const std::vector<Run>& runs, F&& f) {
+  for (size_t i = runs.size(); i-- > 0;) dispatch_run(runs[i], f);
 }
 template <class F>
 LW_INLINE void for_runs_tip_to_base(const Model& model, F&& f) {
-  for (size_t i = model.runs.size(); i-- > 0;) dispatch_run(model.runs[i], f);
+  for_runs_tip_to_base(model.runs, f);
 }
 template <class J>
 inline constexpr bool is_general = std::is_same_v<J, GeneralJoint>;

@@ -82,6 +82,7 @@ void ScaledTree::set_structure(const BlockTree& A) {
     hubs[h].children = A.hubs[h].children;
     joints_on_a_body_ = std::max(joints_on_a_body_, static_cast<int>(hubs[h].children.size()) + 1);
   }
+  hub_sums_.resize(6 * hubs.size());
   lower_.resize(count);
   roots_.resize(count);
 }
@@ -89,29 +90,39 @@ void ScaledTree::set_structure(const BlockTree& A) {
 bool ScaledTree::prepare(const BlockTree& A) {
   structure_changed_ = !same_structure(A);
   if (structure_changed_) set_structure(A);
-  const int count = n();
-  for (int i = 0; i < count; ++i) {
-    failed_node_ = i;
-    const int p = lever_of[i] < 0 ? parent[i] : -1;
-    const bool good = with_dims(dim[i], p < 0 ? 0 : dim[p], [&](auto d, auto c) {
-      double* const lower = lower_[i].data();
-      double* const roots = roots_[i].data();
-      pack_lower<d.n>(A.diag[i].data(), lower);
-      const bool positive = ldlt_factor<d.n>(lower);
+  const Sections nodes(n(), SectionOf::nodes);
+  std::array<int, max_sections> failed;
+  nodes.for_each(threads_, [&](int s, int begin, int end) {
+    failed[s] = -1;
+    for (int i = begin; i < end; ++i)
+      with_dim(dim[i], [&](auto d) {
+        double* const lower = lower_[i].data();
+        pack_lower<d.n>(A.diag[i].data(), lower);
+        if (!ldlt_factor<d.n>(lower) && failed[s] < 0) failed[s] = i;
 #pragma GCC unroll 6
-      for (int k = 0; k < d.n; ++k) roots[k] = std::sqrt(lower[packed(k, k)]);
-      if (p < 0) return positive;
-      coupling[i] = A.parent_block[i];
-      scale_coupling<d.n, c.n>(lower, roots, lower_[p].data(), roots_[p].data(),
-                               coupling[i].data());
-      return positive;
-    });
-    if (!good) return false;
+        for (int k = 0; k < d.n; ++k) roots_[i][k] = std::sqrt(lower[packed(k, k)]);
+      });
+  });
+  for (int s = 0; s < nodes.count; ++s) {
+    failed_node_ = failed[s];
+    if (failed_node_ >= 0) return false;
   }
+  for_each_node([&](int i) {
+    if (parent[i] >= 0 && lever_of[i] < 0) scale_node(A, i);
+  });
   for (std::size_t h = 0; h < hubs.size(); ++h)
     if (!scale_hub(A, static_cast<int>(h))) return false;
   failed_node_ = -1;
   return true;
+}
+
+void ScaledTree::scale_node(const BlockTree& A, int i) {
+  const int p = parent[i];
+  coupling[i] = A.parent_block[i];
+  with_dims(dim[i], dim[p], [&](auto d, auto c) {
+    scale_coupling<d.n, c.n>(lower_[i].data(), roots_[i].data(), lower_[p].data(), roots_[p].data(),
+                             coupling[i].data());
+  });
 }
 
 bool ScaledTree::scale_hub(const BlockTree& A, int h) {
@@ -130,17 +141,18 @@ bool ScaledTree::scale_hub(const BlockTree& A, int h) {
 }
 
 void ScaledTree::scale_right_hand_side(std::span<const double> b, std::span<double> scaled) const {
-  for (int i = 0; i < n(); ++i)
+  for_each_node([&](int i) {
     with_dim(dim[i], [&](auto d) {
       double local[6] = {};
       std::copy(b.data() + offset[i], b.data() + offset[i] + d.n, local);
       ldlt_forward<d.n>(lower_[i].data(), local);
       for (int k = 0; k < d.n; ++k) scaled[offset[i] + k] = local[k] * roots_[i][k];
     });
+  });
 }
 
 void ScaledTree::scale_solution(std::span<const double> x, std::span<double> scaled) const {
-  for (int i = 0; i < n(); ++i)
+  for_each_node([&](int i) {
     with_dim(dim[i], [&](auto d) {
       const double* xi = x.data() + offset[i];
       for (int k = 0; k < d.n; ++k) {
@@ -149,33 +161,36 @@ void ScaledTree::scale_solution(std::span<const double> x, std::span<double> sca
         scaled[offset[i] + k] = sum / roots_[i][k];
       }
     });
+  });
 }
 
 void ScaledTree::unscale_solution(std::span<const double> scaled, std::span<double> x) const {
-  for (int i = 0; i < n(); ++i)
+  for_each_node([&](int i) {
     with_dim(dim[i], [&](auto d) {
       double local[6];
       for (int k = 0; k < d.n; ++k) local[k] = scaled[offset[i] + k] * roots_[i][k];
       ldlt_backward<d.n>(lower_[i].data(), local);
       std::copy(local, local + d.n, x.data() + offset[i]);
     });
+  });
 }
 
 double ScaledTree::solution_norm(std::span<const double> scaled) const {
-  double total = 0.0;
-  for (int i = 0; i < n(); ++i)
+  return std::sqrt(sum_over_nodes([&](int i) {
+    double total = 0.0;
     with_dim(dim[i], [&](auto d) {
       double local[6];
       for (int k = 0; k < d.n; ++k) local[k] = scaled[offset[i] + k] * roots_[i][k];
       ldlt_backward<d.n>(lower_[i].data(), local);
       for (int k = 0; k < d.n; ++k) total += local[k] * local[k];
     });
-  return std::sqrt(total);
+    return total;
+  }));
 }
 
 double ScaledTree::residual_norm(std::span<const double> scaled) const {
-  double total = 0.0;
-  for (int i = 0; i < n(); ++i)
+  return std::sqrt(sum_over_nodes([&](int i) {
+    double total = 0.0;
     with_dim(dim[i], [&](auto d) {
       double local[6];
       for (int k = 0; k < d.n; ++k) local[k] = scaled[offset[i] + k] / roots_[i][k];
@@ -185,7 +200,8 @@ double ScaledTree::residual_norm(std::span<const double> scaled) const {
         total += sum * sum;
       }
     });
-  return std::sqrt(total);
+    return total;
+  }));
 }
 
 }  // namespace linkwise

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "linkwise/exec/sections.hpp"
 #include "linkwise/linear/block_tree.hpp"
 #include "linkwise/linear/ldlt.hpp"
 
@@ -22,6 +23,8 @@ class ScaledTree {
     std::vector<int> children;  ///< ascending
   };
 
+  /// Threads that share the work from now on; they influence no result.
+  void set_threads(int threads) { threads_ = threads; }
   /// Scales A. False when a diagonal block or a hub's compliance is not positive definite;
   /// failed_node() tells where.
   bool prepare(const BlockTree& A);
@@ -52,8 +55,8 @@ class ScaledTree {
 
   /// Row-wise access for Gauss-Seidel: sums[6 h ...] = sum H~^T x - K~^T x_p over hub h.
   void hub_sums(std::span<const double> x, std::span<double> sums) const;
-  /// row -= O_i x, given up-to-date hub sums.
-  void subtract_row(int i, const double* x, const double* sums, double* row) const;
+  /// row += sign O_i x, given up-to-date hub sums.
+  void add_row(int i, const double* x, const double* sums, double* row, double sign) const;
   /// Keeps the hub sums up to date when x_i changes by `change`.
   void update_sums(int i, const double* change, double* sums) const;
 
@@ -68,15 +71,29 @@ class ScaledTree {
   bool same_structure(const BlockTree& A) const;
   void set_structure(const BlockTree& A);
   bool scale_hub(const BlockTree& A, int h);
-  template <bool all>
-  void couple(const double* x, double* y, const char* selected, char value) const;
-  template <bool all>
-  void couple_hub(const Hub& body, const double* x, double* y, const char* selected,
-                  char value) const;
+  /// y += O x in the rows that selected(i) says.
+  template <class Selected>
+  void add_rows(std::span<const double> x, std::span<double> y, Selected&& selected) const;
+  void scale_node(const BlockTree& A, int i);
+  template <class F>
+  void for_each_node(F&& f) const {
+    Sections(n(), SectionOf::nodes).for_each(threads_, [&](int, int begin, int end) {
+      for (int i = begin; i < end; ++i) f(i);
+    });
+  }
+  template <class F>
+  double sum_over_nodes(F&& f) const {
+    return Sections(n(), SectionOf::nodes).sum(threads_, [&](int begin, int end) {
+      double total = 0.0;
+      for (int i = begin; i < end; ++i) total += f(i);
+      return total;
+    });
+  }
 
   std::vector<PackedLower> lower_;            ///< unit L; the diagonal holds 1 / D
   std::vector<std::array<double, 6>> roots_;  ///< sqrt(1 / D)
-  int failed_node_ = -1, joints_on_a_body_ = 2;
+  mutable std::vector<double> hub_sums_;
+  int failed_node_ = -1, joints_on_a_body_ = 2, threads_ = 1;
   bool structure_changed_ = false;
 };
 

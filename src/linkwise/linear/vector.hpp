@@ -1,37 +1,55 @@
 #pragma once
-// Operations on long vectors. Sums run in eight interleaved partial sums of fixed shape: fast, more
-// accurate than one running sum, and the same bits on every run and for every vector width.
+// Operations on long vectors, section by section on `threads` threads. Sums run in eight
+// interleaved partial sums a section, a fixed shape: fast, more accurate than one running sum, and
+// the same bits on every run, for every vector width and any number of threads.
 
 #include <cstddef>
 #include <span>
 
+#include "linkwise/exec/sections.hpp"
+
 namespace linkwise {
 
 template <class Term>
-inline double interleaved_sum(std::size_t count, Term&& term) {
+inline double interleaved_sum(std::size_t begin, std::size_t end, Term&& term) {
   double part[8] = {};
-  std::size_t i = 0;
-  for (; i + 8 <= count; i += 8)
+  std::size_t i = begin;
+  for (; i + 8 <= end; i += 8)
     for (std::size_t k = 0; k < 8; ++k) part[k] += term(i + k);
-  for (std::size_t k = 0; i < count; ++i, ++k) part[k] += term(i);
+  for (std::size_t k = 0; i < end; ++i, ++k) part[k] += term(i);
   return ((part[0] + part[4]) + (part[2] + part[6])) + ((part[1] + part[5]) + (part[3] + part[7]));
 }
 
-inline double dot(std::span<const double> a, std::span<const double> b) {
+inline double dot(std::span<const double> a, std::span<const double> b, int threads = 1) {
   const double *p = a.data(), *q = b.data();
-  return interleaved_sum(a.size(), [=](std::size_t i) { return p[i] * q[i]; });
+  const Sections sections(static_cast<int>(a.size()), SectionOf::entries);
+  return sections.sum(threads, [=](int begin, int end) {
+    return interleaved_sum(begin, end, [=](std::size_t i) { return p[i] * q[i]; });
+  });
 }
 
-inline double sum_of_squares(std::span<const double> a) { return dot(a, a); }
+inline double sum_of_squares(std::span<const double> a, int threads = 1) {
+  return dot(a, a, threads);
+}
+
+/// f(i) for every i below n.
+template <class F>
+inline void for_each_entry(std::size_t n, int threads, F&& f) {
+  const Sections sections(static_cast<int>(n), SectionOf::entries);
+  sections.for_each(threads, [&](int, int begin, int end) {
+    for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i) f(i);
+  });
+}
 
 /// y += factor x.
-inline void add_scaled(double factor, std::span<const double> x, std::span<double> y) {
-  for (std::size_t i = 0; i < y.size(); ++i) y[i] += factor * x[i];
+inline void add_scaled(double factor, std::span<const double> x, std::span<double> y,
+                       int threads = 1) {
+  for_each_entry(y.size(), threads, [=](std::size_t i) { y[i] += factor * x[i]; });
 }
 
 /// y = x - y.
-inline void subtract_from(std::span<const double> x, std::span<double> y) {
-  for (std::size_t i = 0; i < y.size(); ++i) y[i] = x[i] - y[i];
+inline void subtract_from(std::span<const double> x, std::span<double> y, int threads = 1) {
+  for_each_entry(y.size(), threads, [=](std::size_t i) { y[i] = x[i] - y[i]; });
 }
 
 }  // namespace linkwise

@@ -57,6 +57,23 @@ LW_INLINE void set_lane(S& value, int index, double item) {
 }
 
 template <class S>
+LW_INLINE S absolute(const S& x) {
+  if constexpr (std::is_same_v<S, double>)
+    return std::abs(x);
+  else
+    return x < 0 ? -x : x;
+}
+template <class S>
+LW_INLINE S larger(const S& a, const S& b) {
+  return a > b ? a : b;
+}
+/// The smaller one; not a number where b is none.
+template <class S>
+LW_INLINE S smaller(const S& a, const S& b) {
+  return a < b ? a : b;
+}
+
+template <class S>
 LW_INLINE S square_root(S x) {
   if constexpr (std::is_same_v<S, double>) {
     return std::sqrt(x);

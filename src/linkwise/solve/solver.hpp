@@ -89,6 +89,8 @@ struct SolverOptions {
   bool estimate_error = false;
   /// lagged_thomas: how many iterations a solve may take before the factor is renewed.
   int lag_limit = 8;
+  /// Threads that an iteration's products and sums are shared by; they influence no result.
+  int threads = 1;
 };
 
 /// Throws InputError that names the option when one is out of range.

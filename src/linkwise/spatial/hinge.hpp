@@ -48,17 +48,35 @@ LW_INLINE void turn_block(const A& c, const A& s, B& xx, B& xy, B& yy) {
   yy = s * r + c * u;
 }
 
-/// X v.
+/// X v but for the turn about z.
 template <class C, class S>
-LW_INLINE Motion<S> to_child(const HingePlacement<C>& k, S c, S s, Motion<S> v) {
+LW_INLINE Motion<S> to_child(const HingePlacement<C>& k, Motion<S> v) {
   turn(k.cos_alpha, -k.sin_alpha, v.lin.y, v.lin.z);
   turn(k.cos_alpha, -k.sin_alpha, v.ang.y, v.ang.z);
   v.lin.x += k.d * v.ang.y;
   v.lin.y += k.a * v.ang.z - k.d * v.ang.x;
   v.lin.z -= k.a * v.ang.y;
-  turn(c, -s, v.lin.x, v.lin.y);
-  turn(c, -s, v.ang.x, v.ang.y);
   return v;
+}
+
+/// X v.
+template <class C, class S>
+LW_INLINE Motion<S> to_child(const HingePlacement<C>& k, S c, S s, const Motion<S>& v) {
+  Motion<S> out = to_child(k, v);
+  turn(c, -s, out.lin.x, out.lin.y);
+  turn(c, -s, out.ang.x, out.ang.y);
+  return out;
+}
+
+/// X^T f but for the turn about z.
+template <class C, class S>
+LW_INLINE Force<S> to_parent(const HingePlacement<C>& k, Force<S> f) {
+  f.ang.x -= k.d * f.lin.y;
+  f.ang.y += k.d * f.lin.x - k.a * f.lin.z;
+  f.ang.z += k.a * f.lin.y;
+  turn(k.cos_alpha, k.sin_alpha, f.lin.y, f.lin.z);
+  turn(k.cos_alpha, k.sin_alpha, f.ang.y, f.ang.z);
+  return f;
 }
 
 /// X^T f.
@@ -66,12 +84,7 @@ template <class C, class S>
 LW_INLINE Force<S> to_parent(const HingePlacement<C>& k, S c, S s, Force<S> f) {
   turn(c, s, f.lin.x, f.lin.y);
   turn(c, s, f.ang.x, f.ang.y);
-  f.ang.x -= k.d * f.lin.y;
-  f.ang.y += k.d * f.lin.x - k.a * f.lin.z;
-  f.ang.z += k.a * f.lin.y;
-  turn(k.cos_alpha, k.sin_alpha, f.lin.y, f.lin.z);
-  turn(k.cos_alpha, k.sin_alpha, f.ang.y, f.ang.z);
-  return f;
+  return to_parent(k, f);
 }
 
 /// X^T Y X.

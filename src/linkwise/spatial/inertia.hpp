@@ -47,9 +47,10 @@ LW_INLINE Force<Wider<S, T>> operator*(const ArticulatedInertia<S>& Y, const Mot
   return {Y.A * v.lin + Y.B * v.ang, transpose_times(Y.B, v.lin) + Y.C * v.ang};
 }
 
-/// adds the outer product -k U U^T of the column U = (lin, ang).
-template <class S>
-LW_INLINE void subtract_outer(ArticulatedInertia<S>& Y, const Force<S>& V, const Force<S>& U) {
+/// Subtracts the outer product V U^T, of which V is a multiple of U, from a symmetric 6x6 [A B; B^T
+/// C].
+template <class Symmetric, class S>
+LW_INLINE void subtract_outer(Symmetric& Y, const Force<S>& V, const Force<S>& U) {
   const S v[6] = {V.lin.x, V.lin.y, V.lin.z, V.ang.x, V.ang.y, V.ang.z};
   const S u[6] = {U.lin.x, U.lin.y, U.lin.z, U.ang.x, U.ang.y, U.ang.z};
 #pragma GCC unroll 3

@@ -2,8 +2,9 @@
 // Dense 6x6 matrices, row-major, and the inverse of a rigid body's inertia, for the places that
 // assemble blocks. Rows and columns are ordered linear first.
 #include <array>
+#include <utility>
 
-#include "linkwise/spatial/inertia.hpp"
+#include "linkwise/spatial/hinge.hpp"
 
 namespace linkwise {
 
@@ -31,11 +32,11 @@ LW_INLINE Force<S> to_force(const S* v) {
 
 /// Inverse of a body's 6x6 inertia: [1/m - c~ Ic^-1 c~, c~ Ic^-1; ., Ic^-1], so that a = M^-1 w.
 /// Stored as the symmetric [A B; B^T C]; multiply() takes a wrench to an acceleration.
-template <class C>
+template <class T>
 struct Compliance {
-  Sym3<C> A;
-  Mat3<C> B;
-  Sym3<C> C_;
+  Sym3<T> A;
+  Mat3<T> B;
+  Sym3<T> C;
 };
 
 /// Inverse of a symmetric positive definite 3x3 matrix by cofactors.
@@ -56,8 +57,8 @@ inline Compliance<double> invert_inertia(const Inertia<double>& M) {
   central.m[4] += M.m * c.y * c.z;
   central.m[5] -= M.m * (c.x * c.x + c.y * c.y);
   Compliance<double> out;
-  out.C_ = inverse(central);
-  const auto& J = out.C_;
+  out.C = inverse(central);
+  const auto& J = out.C;
   const Vec3<double> columns[3] = {
       {J.m[0], J.m[1], J.m[3]}, {J.m[1], J.m[2], J.m[4]}, {J.m[3], J.m[4], J.m[5]}};
   for (int j = 0; j < 3; ++j) {
@@ -78,7 +79,49 @@ inline Compliance<double> invert_inertia(const Inertia<double>& M) {
 
 template <class C, class S>
 LW_INLINE Motion<Wider<C, S>> operator*(const Compliance<C>& L, const Force<S>& w) {
-  return {L.A * w.lin + L.B * w.ang, transpose_times(L.B, w.lin) + L.C_ * w.ang};
+  return {L.A * w.lin + L.B * w.ang, transpose_times(L.B, w.lin) + L.C * w.ang};
+}
+
+/// The same on lanes.
+template <class S, class T>
+LW_INLINE Compliance<S> widen(const Compliance<T>& from) {
+  Compliance<S> to;
+#pragma GCC unroll 6
+  for (int i = 0; i < 6; ++i) {
+    to.A.m[i] = from.A.m[i] + S{};
+    to.C.m[i] = from.C.m[i] + S{};
+  }
+#pragma GCC unroll 9
+  for (int i = 0; i < 9; ++i) to.B.m[i] = from.B.m[i] + S{};
+  return to;
+}
+
+/// Entry (i, j) of a Compliance.
+template <class L>
+LW_INLINE auto& entry(L& compliance, int i, int j) {
+  if (i < j) std::swap(i, j);
+  return i < 3   ? compliance.A.m[sym_index(i, j)]
+         : j < 3 ? compliance.B.m[3 * j + i - 3]
+                 : compliance.C.m[sym_index(i - 3, j - 3)];
+}
+
+/// Column j: the acceleration that a unit wrench causes.
+template <class C>
+LW_INLINE Motion<C> column(const Compliance<C>& L, int j) {
+  return {{entry(L, 0, j), entry(L, 1, j), entry(L, 2, j)},
+          {entry(L, 3, j), entry(L, 4, j), entry(L, 5, j)}};
+}
+
+/// L seen from axes turned about z by minus the angle with this cosine and sine.
+template <class S>
+LW_INLINE void turn_back(const S& c, const S& s, Compliance<S>& L) {
+  turn_block(c, s, L.A.m[0], L.A.m[1], L.A.m[2]);
+  turn(c, s, L.A.m[3], L.A.m[4]);
+  turn_block(c, s, L.B.m[0], L.B.m[1], L.B.m[3], L.B.m[4]);
+  turn(c, s, L.B.m[2], L.B.m[5]);
+  turn(c, s, L.B.m[6], L.B.m[7]);
+  turn_block(c, s, L.C.m[0], L.C.m[1], L.C.m[2]);
+  turn(c, s, L.C.m[3], L.C.m[4]);
 }
 
 template <class C>
@@ -91,7 +134,7 @@ LW_INLINE Matrix6<C> to_matrix(const Compliance<C>& L) {
       out[6 * i + j] = L.A.m[sym_index(i, j)];
       out[6 * i + 3 + j] = L.B.m[3 * i + j];
       out[6 * (3 + j) + i] = L.B.m[3 * i + j];
-      out[6 * (3 + i) + 3 + j] = L.C_.m[sym_index(i, j)];
+      out[6 * (3 + i) + 3 + j] = L.C.m[sym_index(i, j)];
     }
   return out;
 }

@@ -65,7 +65,7 @@ StackedSystem stacked_system(const Model& model, const SweepInput<double>& in) {
     const bool is_general = body.kind == BodyKind::general;
     const Motion<double>* P = is_general ? general[body.general].P : &column;
     const int* dof = is_general ? general[body.general].dof : &body.v;
-    JointConstraint joint;
+    JointConstraint<double> joint;
     calc_joint_constraint(P, dof, is_general ? general[body.general].n : 1, armature, joint);
     for (int r = 0; r < 6; ++r) {
       g[6 * i + r][0] = -to_array(states[i].bias)[r];
@@ -130,12 +130,6 @@ TEST_P(TreeSystems, EqualTheStackedSystem) {
   }
 }
 
-std::vector<Machine> regular_machines() {
-  std::vector<Machine> all;
-  for (const Machine& machine : all_machines())
-    if (machine.regular) all.push_back(machine);
-  return all;
-}
 INSTANTIATE_TEST_SUITE_P(Machines, TreeSystems, ::testing::ValuesIn(regular_machines()),
                          [](const auto& test) { return test.param.name; });
 
@@ -164,7 +158,7 @@ TEST(JointConstraint, DualAndComplementOfAnyColumns) {
         }
         std::vector<double> armature(6);
         for (int i = 0; i < n; ++i) armature[i] = draws.below(2) ? draws.uniform(0.1, 2) : 0;
-        JointConstraint joint;
+        JointConstraint<double> joint;
         calc_joint_constraint(P, dof, n, armature, joint);
         const auto product = [](const Vector6<double>& a, const Vector6<double>& b) {
           double sum = 0;

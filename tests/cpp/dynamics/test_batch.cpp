@@ -107,6 +107,26 @@ TEST_P(Batch, WhatIsAbsentIsZero) {
   expect_close(absent, zeros, 1e-14, "torques");
 }
 
+class ConstraintForceBatch : public ::testing::TestWithParam<Machine> {};
+
+TEST_P(ConstraintForceBatch, EqualsTheRecursion) {
+  const Model model(GetParam().spec);
+  const size_t nv = model.nv(), n_load = 6 * model.n_joints(), count = native_lanes + 1;
+  BatchEvaluator batch(model);
+  const Rows rows(model, count);
+  std::vector<double> du(count * nv), w(count * n_load), want_du(count * nv), want_w(w.size());
+  EXPECT_EQ(batch.forward_dynamics(count, rows.input(), want_du.data(), want_w.data()), -1);
+  EXPECT_EQ(batch.forward_dynamics(count, rows.input(), du.data(), w.data(),
+                                   BatchMethod::constraint_force),
+            -1);
+  for (size_t i = 0; i < count; ++i) {
+    expect_close(row(du, nv, i), row(want_du, nv, i), 1e-9, "accelerations");
+    expect_close(row(w, n_load, i), row(want_w, n_load, i), 1e-9, "loads");
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Regular, ConstraintForceBatch, ::testing::ValuesIn(regular_machines()),
+                         [](const auto& test) { return test.param.name; });
 INSTANTIATE_TEST_SUITE_P(Machines, Batch, ::testing::ValuesIn(all_machines()),
                          [](const auto& test) { return test.param.name; });
 

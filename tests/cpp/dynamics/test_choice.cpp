@@ -108,7 +108,7 @@ TEST(Failure, IsReportedWithItsBody) {
   spec.links[3].inertia = {};
   const Model model(spec);
   const DynamicsCase c(model, 55);
-  for (const char* name : {"articulated_body", "branch_recursion", "composite_rigid_body",
+  for (const char* name : {"articulated_body", "composite_rigid_body",
                            "joint_space_conjugate_gradient", "global_projection"}) {
     std::vector<double> du(model.nv());
     const DynamicsReport report =
@@ -121,7 +121,7 @@ TEST(Failure, IsReportedWithItsBody) {
   const Model geared(spec);
   SweepInput<double> in = c.input();
   in.external = nullptr;
-  for (const char* name : {"articulated_body", "branch_recursion", "composite_rigid_body",
+  for (const char* name : {"articulated_body", "composite_rigid_body",
                            "joint_space_conjugate_gradient", "global_projection"})
     EXPECT_NEAR(evaluate(*make_dynamics(geared, with_method(name)), geared, in).du[4],
                 c.tau[4] / 0.25, 1e-9);

@@ -10,13 +10,6 @@
 namespace linkwise::testing {
 namespace {
 
-std::vector<Machine> regular_machines() {
-  std::vector<Machine> all;
-  for (const Machine& machine : all_machines())
-    if (machine.regular) all.push_back(machine);
-  return all;
-}
-
 DynamicsOptions thomas() {
   DynamicsOptions options;
   options.method = "constraint_force";

@@ -258,4 +258,12 @@ inline std::vector<double> random_values(int n, Draws& draws, double size = 1) {
   return out;
 }
 
+/// Those whose bodies all have an inertia to invert.
+inline std::vector<Machine> regular_machines() {
+  std::vector<Machine> all;
+  for (const Machine& machine : all_machines())
+    if (machine.regular) all.push_back(machine);
+  return all;
+}
+
 }  // namespace linkwise::testing

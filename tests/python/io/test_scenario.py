@@ -373,7 +373,7 @@ def test_defect_is_named(write, complaint, text, expected):
         (
             'model = "arm.urdf"\n[simulate]\nduration = 1\nmethod = "featherstone"',
             ": simulate.method: unknown method 'featherstone'; "
-            "known: articulated_body, branch_recursion, constraint_force, piecewise, "
+            "known: articulated_body, constraint_force, piecewise, "
             "composite_rigid_body, joint_space_conjugate_gradient, global_projection, auto",
         ),
         (

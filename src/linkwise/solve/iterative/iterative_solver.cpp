@@ -28,7 +28,7 @@ void IterativeSolver::multiply(std::span<const double> x, std::span<double> y) c
 }
 
 double IterativeSolver::preconditioned_square(std::span<const double> residual) {
-  return sum_of_squares(residual);
+  return sum_of_squares(residual, threads());
 }
 
 Outcome IterativeSolver::prepare_all(const BlockTree& A) {
@@ -44,7 +44,7 @@ Outcome IterativeSolver::prepare_all(const BlockTree& A) {
 }
 
 Report IterativeSolver::solve(const BlockTree& A, std::span<const double> b, std::span<double> x) {
-  const double size_of_b = sum_of_squares(b);
+  const double size_of_b = sum_of_squares(b, threads());
   Report report;
   if (!std::isfinite(size_of_b)) {
     report.outcome = Outcome::not_finite;
@@ -55,7 +55,7 @@ Report IterativeSolver::solve(const BlockTree& A, std::span<const double> b, std
     std::fill(x.begin(), x.end(), 0.0);
     return report;
   }
-  if (!std::isfinite(sum_of_squares(x))) std::fill(x.begin(), x.end(), 0.0);
+  if (!std::isfinite(sum_of_squares(x, threads()))) std::fill(x.begin(), x.end(), 0.0);
   report.outcome = prepare_all(A);
   if (report.ok())
     report = run(A, b, x);
@@ -88,7 +88,7 @@ Report IterativeSolver::run(const BlockTree& A, std::span<const double> b, std::
     std::copy(x_.begin(), x_.end(), x.begin());
 
   Report report{stop_.outcome(), stop_.iterations(), stop_.relative_error(), -1};
-  if (!std::isfinite(sum_of_squares(x))) report.outcome = Outcome::not_finite;
+  if (!std::isfinite(sum_of_squares(x, threads()))) report.outcome = Outcome::not_finite;
   const bool ended = report.ok() || report.outcome == Outcome::stagnated;
   // A guess that is all but exact leaves nothing to see decrease: the residual tells.
   if (ended && options_.stop == StopRule::energy_norm && (!report.ok() || rounding_may_matter(x_)))
@@ -102,7 +102,8 @@ bool IterativeSolver::rounding_may_matter(std::span<const double> x) const {
   // preconditioner.
   if (coordinates_ == Coordinates::original) return true;
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
-  const double floor = 10.0 * epsilon * epsilon * sum_of_squares(x) / stop_.smallest_eigenvalue();
+  const double floor =
+      10.0 * epsilon * epsilon * sum_of_squares(x, threads()) / stop_.smallest_eigenvalue();
   return floor > 0.01 * stop_.energy_bound() * stop_.energy_bound();
 }
 
@@ -114,7 +115,7 @@ double IterativeSolver::bound_error(std::span<const double> b, std::span<const d
     accurate_residual(*system_, b, x, residual_);
   } else {
     system_->multiply(x, residual_);
-    subtract_from(b, residual_);
+    subtract_from(b, residual_, threads());
   }
   if (coordinates_ == Coordinates::block_scaled)
     scaled_.scale_right_hand_side(residual_, b_);
@@ -144,7 +145,7 @@ void IterativeSolver::verify(std::span<const double> b, std::span<double> x, Rep
     const bool complete = stop_.outcome() == Outcome::converged;
     // What an unfinished correction still lacks is part of the error too.
     const double missing = complete ? 0.0 : std::min(square, stop_.squared_error());
-    const double error = std::sqrt(std::max(0.0, dot(b_, x_)) + missing);
+    const double error = std::sqrt(std::max(0.0, dot(b_, x_, threads())) + missing);
     report.error_estimate = error * scale;
     if (complete && error <= bound) return;
     if (!complete || error > 0.5 * previous) {
@@ -156,7 +157,7 @@ void IterativeSolver::verify(std::span<const double> b, std::span<double> x, Rep
       scaled_.unscale_solution(x_, correction_);
     else
       std::copy(x_.begin(), x_.end(), correction_.begin());
-    add_scaled(1.0, correction_, x);
+    add_scaled(1.0, correction_, x, threads());
   }
 }
 

@@ -53,19 +53,31 @@ double Relaxation::sweep(std::span<const double> b, std::span<double> x, double 
   const ScaledTree& system = scaled();
   // Afresh in every sweep, so that rounding in the running sums does not accumulate.
   system.hub_sums(x, sums_);
-  double total = 0.0;
-  for (int i : sequence_) {
-    const int at = system.offset[i], dim = system.dim[i];
-    double row[6];
-    for (int k = 0; k < dim; ++k) row[k] = b[at + k] - x[at + k];
-    system.subtract_row(i, x.data(), sums_.data(), row);
-    for (int k = 0; k < dim; ++k) {
-      row[k] *= omega;
-      total += row[k] * row[k];
-      change_[at + k] = row[k];
-      x[at + k] += row[k];
+  const auto relax = [&](int begin, int end) {
+    double square = 0.0;
+    for (int s = begin; s < end; ++s) {
+      const int i = sequence_[s], at = system.offset[i], dim = system.dim[i];
+      double row[6];
+      for (int k = 0; k < dim; ++k) row[k] = b[at + k] - x[at + k];
+      system.add_row(i, x.data(), sums_.data(), row, -1.0);
+      for (int k = 0; k < dim; ++k) {
+        row[k] *= omega;
+        square += row[k] * row[k];
+        change_[at + k] = row[k];
+        x[at + k] += row[k];
+      }
+      system.update_sums(i, row, sums_.data());
     }
-    system.update_sums(i, row, sums_.data());
+    return square;
+  };
+  if (order_ == SweepOrder::base_to_tip) return relax(0, system.n());
+  // Nodes of one colour share neither an unknown nor a hub's sum.
+  double total = 0.0;
+  for (int first = 0, end = 0; first < system.n(); first = end) {
+    while (end < system.n() && colours_[sequence_[end]] == colours_[sequence_[first]]) ++end;
+    total += Sections(end - first, SectionOf::nodes).sum(threads(), [&](int from, int to) {
+      return relax(first + from, first + to);
+    });
   }
   return total;
 }
@@ -79,11 +91,11 @@ void Relaxation::iterate(std::span<const double> b, std::span<double> x, StopTes
     change = sweep(b, x, omega);
     if (stop.needs_residual()) {
       multiply(x, residual_);
-      subtract_from(b, residual_);
+      subtract_from(b, residual_, threads());
     }
     IterationStep step;
     step.decrease = (2.0 - omega) / omega * change;
-    step.solution_energy = dot(x, b);
+    step.solution_energy = dot(x, b, threads());
     step.x = x;
     step.change = change_;
     step.residual = residual_;
