@@ -72,9 +72,10 @@ inline std::string shape_text(const Shape& shape) {
 }
 
 inline nb::tuple to_tuple(const Shape& shape) {
-  nb::list lengths;
-  for (const size_t n : shape) lengths.append(n);
-  return nb::tuple(lengths);
+  nb::tuple lengths = nb::steal<nb::tuple>(PyTuple_New(static_cast<Py_ssize_t>(shape.size())));
+  for (size_t i = 0; i < shape.size(); ++i)
+    PyTuple_SET_ITEM(lengths.ptr(), static_cast<Py_ssize_t>(i), PyLong_FromSize_t(shape[i]));
+  return lengths;
 }
 
 /// A view of an array's numbers. Made and destroyed with the GIL held.

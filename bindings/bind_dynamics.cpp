@@ -13,7 +13,8 @@ namespace linkwise::bindings {
 namespace {
 
 struct ForwardResult {
-  nb::object acceleration, joint_load, constraint_force, report;
+  nb::object acceleration, joint_load, constraint_force;
+  PyReport report;
 };
 
 void check_external(const Model& m, const States& s) {
@@ -126,19 +127,26 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
         "prescribed: the model has no joint of given motion; use model.prescribe([...])");
   const ForwardOptions asked{method, solver, stop, tolerance, max_iterations, solver_options};
   const bool plain = (method == "auto" || method == "articulated_body") && solver == "auto";
+  // Options that nobody touched need no reading, which costs as much as a small machine's dynamics.
+  const bool untouched = tolerance == 1e-12 && stop == "energy_norm" && max_iterations == 0 &&
+                         solver_options.is_none();
   const int team = threads_of(threads, s.count * m.n_bodies());
   PyReport report;
   std::unique_ptr<DynamicsMethod> own;
   DynamicsMethod* other = nullptr;
   PyModel::Lease scratch(self);
-  if (method == "auto" && plain && s.count == 1 && scratch->piecewise_suits()) {
+  if (method == "auto" && plain && s.count == 1 &&
+      scratch->default_choice().method == "piecewise") {
     other = &scratch->piecewise(team);
     report.method = "piecewise";
     report.solver = "thomas";
-    if (full) report.reason = choose_dynamics(m, dynamics_options(asked)).reason;
+    if (!untouched) dynamics_options(asked);
+    if (full) report.reason = scratch->default_choice().reason;
   } else if (plain) {
     report.method = "articulated_body";
-    if (full || !solver_options.is_none())
+    if (untouched && method == "auto" && scratch->default_choice().method == report.method)
+      report.reason = full ? scratch->default_choice().reason : "";
+    else if (full || !untouched)
       report.reason = choose_dynamics(m, dynamics_options(asked)).reason;
   } else {
     DynamicsOptions options = dynamics_options(asked);
@@ -216,8 +224,8 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
     std::copy(force.begin(), force.end(), f.data);
     result.constraint_force = f.array;
   }
-  result.report = nb::cast(report);
-  return nb::cast(result);
+  result.report = std::move(report);
+  return nb::cast(std::move(result));
 }
 
 nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle a,

@@ -34,10 +34,10 @@ struct Scratch {
     composite_->mass_matrix(q, H);
   }
 
-  /// Does "auto" take the piecewise method for one state of this model?
-  bool piecewise_suits() {
-    if (suits_ < 0) suits_ = choose_dynamics(*model_, {}).method == "piecewise";
-    return suits_ > 0;
+  /// What "auto" stands for with all options left alone, and why.
+  const Choice& default_choice() {
+    if (choice_.method.empty()) choice_ = choose_dynamics(*model_, {});
+    return choice_;
   }
   DynamicsMethod& piecewise(int threads) {
     if (!piecewise_ || piecewise_threads_ != threads) {
@@ -53,7 +53,8 @@ struct Scratch {
   const Model* model_;
   std::unique_ptr<CompositeRigidBody> composite_;
   std::unique_ptr<DynamicsMethod> piecewise_;
-  int suits_ = -1, piecewise_threads_ = 0;
+  Choice choice_;
+  int piecewise_threads_ = 0;
 };
 
 class PyModel {

@@ -161,18 +161,20 @@ class ModelAssembly {
         !std::isfinite(spec.gravity.z))
       fail("model '" + spec.name + "'" + where +
            ": gravity is not finite; give three finite numbers in m/s2");
-    m.link_by_name_.reserve(spec.links.size());
+    const auto link_name = [this](int i) -> const auto& { return spec.links[i].name; };
+    m.link_by_name_.reset(spec.links.size());
     for (size_t i = 0; i < spec.links.size(); ++i) {
       validate_link(spec.links[i], where, m.notes);
-      if (!m.link_by_name_.emplace(spec.links[i].name, static_cast<int>(i)).second)
+      if (!m.link_by_name_.insert(static_cast<int>(i), link_name))
         fail("link '" + spec.links[i].name + "'" + where +
              ": the name is used twice; rename one of them");
     }
   }
 
   int find_link(const std::string& name, const JointSpec& joint, const char* role) const {
-    const auto it = m.link_by_name_.find(name);
-    if (it != m.link_by_name_.end()) return it->second;
+    const int found = m.link_by_name_.find(
+        name, [this](int i) -> const auto& { return spec.links[i].name; });
+    if (found >= 0) return found;
     std::vector<std::string> known;
     for (const auto& l : spec.links) known.push_back(l.name);
     fail("joint '" + joint.name + "'" + where + ": " + role + " link '" + name +
@@ -182,12 +184,13 @@ class ModelAssembly {
   void check_joints() {
     const int n_links = static_cast<int>(spec.links.size());
     inboard.assign(n_links, -1);
-    std::unordered_map<std::string, int> names;
-    names.reserve(spec.joints.size());
+    const auto joint_name = [this](int i) -> const auto& { return spec.joints[i].name; };
+    NameIndex names;
+    names.reset(spec.joints.size());
     for (size_t i = 0; i < spec.joints.size(); ++i) {
       JointSpec& j = spec.joints[i];
       validate_joint(j, where);
-      if (!names.emplace(j.name, static_cast<int>(i)).second)
+      if (!names.insert(static_cast<int>(i), joint_name))
         fail("joint '" + j.name + "'" + where + ": the name is used twice; rename one of them");
       parent_link.push_back(find_link(j.parent, j, "parent"));
       child_link.push_back(find_link(j.child, j, "child"));
@@ -333,6 +336,10 @@ class ModelAssembly {
     if (spec.floating_base) add_joint(-1);
     for (int j : order)
       if (!welded[j]) add_joint(j);
+    m.joint_by_name_.reset(m.joints.size());
+    for (int i = 0; i < m.n_joints(); ++i)
+      m.joint_by_name_.insert(
+          i, [this](int k) -> const auto& { return m.joints[k].name; });
     for (size_t l = 0; l < spec.links.size(); ++l)
       m.links.push_back({spec.links[l].name, joint_of[lead[l]], from_lead[l]});
   }
@@ -352,7 +359,6 @@ class ModelAssembly {
     m.nv_ += info.nv;
     joint_of[info.link] = m.n_joints();
     if (j >= 0) model_joint[j] = m.n_joints();
-    m.joint_by_name_.emplace(s.name, m.n_joints());
     m.joints.push_back(std::move(info));
   }
 
@@ -509,8 +515,9 @@ class ModelAssembly {
 Model::Model(ModelSpec spec) : spec_(std::move(spec)) { ModelAssembly(*this).run(); }
 
 int Model::joint_index(const std::string& name) const {
-  const auto it = joint_by_name_.find(name);
-  if (it != joint_by_name_.end()) return it->second;
+  const int found = joint_by_name_.find(
+      name, [this](int i) -> const auto& { return joints[i].name; });
+  if (found >= 0) return found;
   std::vector<std::string> known;
   for (const auto& j : joints) known.push_back(j.name);
   throw InputError("joint '" + name + "' does not exist in model '" + spec_.name + "'" + where() +
@@ -518,8 +525,9 @@ int Model::joint_index(const std::string& name) const {
 }
 
 int Model::link_index(const std::string& name) const {
-  const auto it = link_by_name_.find(name);
-  if (it != link_by_name_.end()) return it->second;
+  const int found = link_by_name_.find(
+      name, [this](int i) -> const auto& { return links[i].name; });
+  if (found >= 0) return found;
   std::vector<std::string> known;
   for (const auto& l : links) known.push_back(l.name);
   throw InputError("link '" + name + "' does not exist in model '" + spec_.name + "'" + where() +

@@ -9,10 +9,10 @@
 #include <cstdint>
 #include <memory>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "linkwise/joints/element.hpp"
+#include "linkwise/model/name_index.hpp"
 #include "linkwise/model/spec.hpp"
 #include "linkwise/spatial/inertia.hpp"
 
@@ -112,7 +112,7 @@ class Model {
   double total_mass_ = 0;
   bool has_passive_ = false;
   int singular_body_ = -1;
-  std::unordered_map<std::string, int> joint_by_name_, link_by_name_;
+  NameIndex joint_by_name_, link_by_name_;
 };
 
 }  // namespace linkwise
