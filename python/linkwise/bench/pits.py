@@ -69,8 +69,9 @@ class Pits:
         return self._workers[key]
 
     def forecast(self, engine: Engine, arena: str, n: int) -> float:
-        """Bytes for n bodies, by the power law through the last two sizes of this case."""
-        known = sorted(self._sizes.get((engine.name, arena), {}).items())
+        """Bytes for n bodies, by the power law through the last two sizes that took any."""
+        sizes = self._sizes.get((engine.name, arena), {})
+        known = sorted((count, bytes_) for count, bytes_ in sizes.items() if bytes_ > 0)
         if len(known) < 2 or n <= known[-1][0]:
             return 0.0
         (n0, m0), (n1, m1) = known[-2:]

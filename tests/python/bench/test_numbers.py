@@ -69,6 +69,9 @@ def test_memory_is_forecast_from_the_two_largest_sizes():
     box = Box(pits, engine, PYTHON, None)
     pits._sizes[engine.name, PYTHON] = {30: 5, 100: 10_000_000, 300: 90_000_000}
     assert pits.forecast(engine, PYTHON, 3000) == pytest.approx(9e9, rel=1e-6)  # quadratic
+    pits._sizes[engine.name, PYTHON][7] = 0  # a machine that took no page more
+    pits._sizes[engine.name, PYTHON][310] = 0
+    assert pits.forecast(engine, PYTHON, 3000) == pytest.approx(9e9, rel=1e-6)
     assert "would need 8 GiB" in box.too_big(3000)
     assert box.too_big(1000) == ""
     box.failed(1000)
