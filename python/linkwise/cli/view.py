@@ -52,14 +52,36 @@ def view(
     no_loads: Annotated[
         bool, typer.Option("--no-loads", help="Show the motion of a run alone.")
     ] = False,
+    cause: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--cause",
+            help="Only loads with this cause: gravity, velocity, drive, motion, passive, external; "
+            "repeatable.",
+        ),
+    ] = None,
+    color: Annotated[
+        str, typer.Option("--color", metavar="size|rating", help="What colours of loads mean.")
+    ] = "size",
+    ratings: Annotated[
+        Path | None,
+        typer.Option(
+            help="TOML file with [rating.JOINT] tables; those of the run's scenario by default.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show RUN or MODEL in 3-D in the browser: motion, and the load of every joint. Ctrl-C ends."""
+    from linkwise._core import InputError
     from linkwise.view.export import check_file, write_html
     from linkwise.view.live import show
     from linkwise.view.server import check_address
     from linkwise.view.source import Options, open_source
 
+    if color not in ("size", "rating"):
+        raise InputError(f"--color: {color!r} is unknown; use size or rating")
+    by_rating = color == "rating"
     if export is not None:
         check_file(export)
     else:
@@ -71,12 +93,14 @@ def view(
             package_dirs=package_dir or [],
             floating_base=floating_base,
             loads=not no_loads,
+            ratings=ratings,
+            causes=cause or [],
         ),
     )
     for note in source.notes:
         say(note)
     if export is not None:
-        written = write_html(source, export)
+        written = write_html(source, export, by_rating=by_rating)
         _report(
             as_json,
             {
@@ -94,7 +118,14 @@ def view(
         _report(as_json, {"address": address}, f"{address} shows {source.title}; Ctrl-C ends.")
 
     try:
-        show(source, host=host, port=port, open_browser=not no_open, started=started)
+        show(
+            source,
+            host=host,
+            port=port,
+            open_browser=not no_open,
+            started=started,
+            by_rating=by_rating,
+        )
     except KeyboardInterrupt:
         return
 

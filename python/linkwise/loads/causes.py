@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -83,7 +84,7 @@ class Split:
             return "motion" in self.given.values()
         return True
 
-    def shares(self, where: slice) -> Array:
+    def shares(self, where: slice | Sequence[int]) -> Array:
         """(time, cause, joint, 6) of these samples."""
         q = rows(self.run, "position", where)
         v = rows(self.run, "velocity", where)
@@ -92,7 +93,7 @@ class Split:
         return np.stack([make(name, q, v, outside, where) for name in self.names], axis=1)
 
     def _of_force(
-        self, cause: str, q: Array, v: Array, outside: Array | None, where: slice
+        self, cause: str, q: Array, v: Array, outside: Array | None, where: slice | Sequence[int]
     ) -> Array:
         options: dict[str, Any] = {"gravity": 1.0 if cause == "gravity" else 0.0}
         rates = v if cause == "velocity" else None
@@ -111,7 +112,7 @@ class Split:
         return np.asarray(found.joint_load)
 
     def _of_motion(
-        self, cause: str, q: Array, v: Array, outside: Array | None, where: slice
+        self, cause: str, q: Array, v: Array, outside: Array | None, where: slice | Sequence[int]
     ) -> Array:
         rates = v if cause == "velocity" else None
         acceleration = None

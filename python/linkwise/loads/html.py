@@ -186,7 +186,7 @@ def _plotly() -> Any:
     return plotly
 
 
-def _script_json(value: Any) -> str:
+def script_json(value: Any) -> str:
     """JSON that cannot end the script element it stands in."""
     return json.dumps(value).replace("<", "\\u003c")
 
@@ -240,7 +240,7 @@ def write_report(
         "<h2>Energy and solver</h2><div id='energy-figures' class='grid'></div>",
         _health(run, limits),
         f"<h2>Scenario</h2><pre>{escape(scenario)}</pre>" if scenario else "",
-        f"<script type='application/json' id='figures'>{_script_json(content)}</script>",
+        f"<script type='application/json' id='figures'>{script_json(content)}</script>",
         f"<script>{plotly.offline.get_plotlyjs()}</script><script>{_SCRIPT}</script></body></html>\n",
     ]
     try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import numpy as np
 from linkwise._core import InputError
 from linkwise.io.complaint import near
 from linkwise.loads.engineering import QUANTITIES
+from linkwise.loads.samples import Array
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,6 +40,31 @@ class Rating:
                 raise InputError(f"rating {field.name}: is {value:g}; give a positive number in SI")
 
 
+def rating_table(
+    ratings: Mapping[str, Rating], joints: Sequence[str], quantities: Sequence[str]
+) -> Array:
+    """Ratings (quantity, joint), NaN where nothing is rated; InputError for others."""
+    table = np.full((len(quantities), len(joints)), np.nan)
+    where = {joint: j for j, joint in enumerate(joints)}
+    for joint, rating in ratings.items():
+        if joint not in where:
+            raise InputError(
+                f"rating for joint {joint!r}: run holds no such joint; "
+                f"{near(joint, joints, 'the joints are')}"
+            )
+        for field in fields(rating):
+            value = getattr(rating, field.name)
+            if value is None:
+                continue
+            if field.name not in quantities:
+                raise InputError(
+                    f"rating for joint {joint!r}: the run gives no {field.name}; record velocity "
+                    "and drive_torque"
+                )
+            table[list(quantities).index(field.name), where[joint]] = value
+    return table
+
+
 def margins(
     summary: xr.Dataset, ratings: Mapping[str, Rating], plus_minus: xr.DataArray | None = None
 ) -> xr.Dataset:
@@ -57,29 +83,12 @@ def margins(
 
     joints = [str(name) for name in summary["joint"].values]
     names = [str(name) for name in summary["quantity"].values]
-    table = np.full((len(names), len(joints)), np.nan)
-    for joint, rating in ratings.items():
-        if joint not in joints:
-            raise InputError(
-                f"rating for joint {joint!r}: run holds no such joint; "
-                f"{near(joint, joints, 'the joints are')}"
-            )
-        for field in fields(rating):
-            value = getattr(rating, field.name)
-            if value is None:
-                continue
-            if field.name not in names:
-                raise InputError(
-                    f"rating for joint {joint!r}: the run gives no {field.name}; record velocity "
-                    "and drive_torque"
-                )
-            k, j = names.index(field.name), joints.index(joint)
-            if np.isnan(summary["peak"].values[k, j]):
-                raise InputError(
-                    f"rating for joint {joint!r}: it has no single axis, so no "
-                    f"{QUANTITIES[field.name].long_name}; rate force or moment"
-                )
-            table[k, j] = value
+    table = rating_table(ratings, joints, names)
+    for k, j in np.argwhere(np.isfinite(table) & np.isnan(summary["peak"].values)):
+        raise InputError(
+            f"rating for joint {joints[j]!r}: it has no single axis, so no "
+            f"{QUANTITIES[names[k]].long_name}; rate force or moment"
+        )
     peak = np.abs(summary["peak"].values)
     if plus_minus is not None:
         peak = peak + plus_minus.values

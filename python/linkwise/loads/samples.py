@@ -104,7 +104,7 @@ def rows(run: Run, name: str, where: slice | Sequence[int]) -> Array:
     return np.asarray(variable.transpose("time", *last)[where].values, dtype=np.float64)
 
 
-def external(run: Run, model: Model, where: slice) -> Array | None:
+def external(run: Run, model: Model, where: slice | Sequence[int]) -> Array | None:
     """The wrenches on all bodies (time, body, 6), None where there are none.
 
     A run with wrenches that did not record them cannot be evaluated again.

@@ -13,6 +13,8 @@ from linkwise.view.shapes import Array, turning_z_to
 _STOPS = np.array(
     [[120, 180, 230], [40, 130, 210], [70, 70, 190], [150, 20, 120], [170, 0, 20]], dtype=float
 )
+_USE_STOPS = np.array([[10, 70, 150], [225, 170, 0], [215, 80, 0]], dtype=float)
+_OVERLOADED, _UNRATED = np.array([110.0, 0, 20]), np.array([110.0, 110, 110])
 _NOTHING = 1e-9  # of a size: three.js cannot invert a transform of scale 0
 
 
@@ -33,10 +35,30 @@ def colors_of(share: Array) -> npt.NDArray[np.uint8]:
     return np.asarray(np.rint(mixed), dtype=np.uint8)
 
 
+def colors_of_use(use: Array) -> npt.NDArray[np.uint8]:
+    """Colours (n, 3) of shares of a rating: one step at 1; grey where nothing is rated."""
+    at = np.clip(np.nan_to_num(use), 0.0, 1.0) * (len(_USE_STOPS) - 1)
+    low = np.minimum(at.astype(int), len(_USE_STOPS) - 2)
+    mixed = _USE_STOPS[low] + (at - low)[:, None] * (_USE_STOPS[low + 1] - _USE_STOPS[low])
+    mixed[use > 1] = _OVERLOADED
+    mixed[np.isnan(use)] = _UNRATED
+    return np.asarray(np.rint(mixed), dtype=np.uint8)
+
+
 def color_bar() -> str:
     """The colours as a CSS gradient, small ones left."""
-    stops = ", ".join(f"rgb({r:.0f}, {g:.0f}, {b:.0f})" for r, g, b in _STOPS)
-    return f"linear-gradient(90deg, {stops})"
+    return f"linear-gradient(90deg, {', '.join(map(_css, _STOPS))})"
+
+
+def use_bar() -> str:
+    """The colours of shares of a rating as a CSS gradient: 0 left, 1 at four fifths."""
+    end = 80 / (len(_USE_STOPS) - 1)
+    steps = [f"{_css(color)} {end * k:g}%" for k, color in enumerate(_USE_STOPS)]
+    return f"linear-gradient(90deg, {', '.join(steps)}, {_css(_OVERLOADED)} 80%)"
+
+
+def _css(color: Array) -> str:
+    return "rgb({:.0f}, {:.0f}, {:.0f})".format(*color)
 
 
 def in_world(frames: Array, loads: Array) -> tuple[Array, Array]:
@@ -46,12 +68,18 @@ def in_world(frames: Array, loads: Array) -> tuple[Array, Array]:
     return turned[:, 0], turned[:, 1]
 
 
-def instances(points: Array, vectors: Array, largest: float, longest: float) -> Instances:
-    """An instance a vector: `largest` gets the length `longest` [m], others their share."""
+def instances(
+    points: Array, vectors: Array, largest: float, longest: float, use: Array | None = None
+) -> Instances:
+    """An instance a vector: `largest` gets the length `longest` [m], others their share.
+
+    The colour is that of the share, or of `use`, the shares of a rating.
+    """
     size = np.linalg.norm(vectors, axis=1)
     size = np.where(np.isfinite(size), size, 0.0)
     share = size / largest if largest > 0 else np.zeros_like(size)
     up = np.array([0.0, 0.0, 1.0])
     directions = np.where(size[:, None] > 0, vectors / np.maximum(size, 1e-300)[:, None], up)
+    colors = colors_of(share) if use is None else colors_of_use(use)
     scales = longest * np.maximum(share, _NOTHING)
-    return Instances(points, turning_z_to(directions), scales, colors_of(share))
+    return Instances(points, turning_z_to(directions), scales, colors)

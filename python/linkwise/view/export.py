@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-from html import escape
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from linkwise._core import InputError
-from linkwise.view.panel import legend
+from linkwise.view.player import overlay
 from linkwise.view.scene import Scene
 from linkwise.view.server import LOCAL, running
+from linkwise.view.shown_loads import rating_use
 from linkwise.view.source import Source, static_loads
 
 FRAMES_PER_SECOND = 30
@@ -53,14 +53,19 @@ def frame_samples(times: Any, n_joints: int) -> Any:
     return np.unique(np.clip(np.searchsorted(times, wanted), 0, len(times) - 1))
 
 
-def write_html(source: Source, path: str | os.PathLike[str]) -> Exported:
+def write_html(
+    source: Source, path: str | os.PathLike[str], *, by_rating: bool = False
+) -> Exported:
     """Write the source as a file that needs neither network nor linkwise.
 
-    A run becomes a film of its samples with their loads, a model a still with nothing moving.
+    A run becomes a film of its samples with their loads and a plot of the load of a joint, a model
+    a still with nothing moving. by_rating: colours show how much of the ratings loads use.
     """
     file = check_file(path)
+    use = rating_use(source, by_rating)
     with running(LOCAL, 0, source.title) as server:
         scene = Scene(server, source)
+        scene.use = use if by_rating else None
         recording = source.recording
         if recording is None:
             q = source.model.neutral_configuration()
@@ -80,7 +85,7 @@ def write_html(source: Source, path: str | os.PathLike[str]) -> Exported:
             assert serializer is not None
             html, frames = serializer.as_html(), len(chosen)
             duration = float(recording.times[chosen[-1]] - recording.times[chosen[0]])
-    html = _with_caption(html, source)
+    html = _with_overlay(html, overlay(source, by_rating=by_rating))
     try:
         file.write_text(html, encoding="utf-8")
     except OSError as error:
@@ -90,15 +95,6 @@ def write_html(source: Source, path: str | os.PathLike[str]) -> Exported:
     return Exported(file, frames, duration, file.stat().st_size)
 
 
-def _with_caption(html: str, source: Source) -> str:
-    """The page with a title, and with the meaning of the colours."""
-    recording = source.recording
-    colors = legend(recording.largest) if recording and recording.has_loads else ""
-    caption = (
-        '<div style="position:fixed;left:12px;bottom:56px;z-index:10;min-width:260px;'
-        "font-family:sans-serif;background:rgba(255,255,255,.85);border-radius:6px;"
-        f'padding:6px 2px;pointer-events:none"><div style="padding:0 12px"><b>'
-        f"{escape(source.title)}</b></div>{colors}</div>"
-    )
+def _with_overlay(html: str, overlay: str) -> str:
     before, found, after = html.rpartition("</body>")
-    return before + caption + found + after if found else html
+    return before + overlay + found + after if found else html + overlay

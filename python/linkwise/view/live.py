@@ -16,6 +16,7 @@ from linkwise.view.panel import (
     JointChoice,
     PlaybackControls,
     Wishes,
+    add_load_choices,
     add_show_folder,
     headline,
     legend,
@@ -23,6 +24,7 @@ from linkwise.view.panel import (
 from linkwise.view.playback import Playback, sample_at
 from linkwise.view.scene import Scene
 from linkwise.view.server import running
+from linkwise.view.shown_loads import rating_use
 from linkwise.view.source import Recording, Source, static_loads
 
 if TYPE_CHECKING:
@@ -35,7 +37,9 @@ _PLOT_INTERVAL = 0.1
 class View:
     """A source on a server: the scene, the panel, and what moves them."""
 
-    def __init__(self, server: viser.ViserServer, source: Source) -> None:
+    def __init__(
+        self, server: viser.ViserServer, source: Source, *, by_rating: bool = False
+    ) -> None:
         self._source = source
         self._wishes = Wishes(redraw=True)
         self._joint = 0
@@ -43,8 +47,10 @@ class View:
         self._told = 0.0
         server.gui.add_html(headline(source))
         self.scene = Scene(server, source)
-        names = source.model.joint_names
         recording = source.recording
+        self._use = rating_use(source, by_rating)
+        self.scene.use = self._use if by_rating else None
+        self._largest = (0.0, 0.0) if recording is None else recording.largest
         self._plot: LoadPlot | None = None
         self._choice: JointChoice | None = None
         self._playback: Playback | None = None
@@ -52,24 +58,37 @@ class View:
             self.scene.set_largest(*recording.largest)
             self._playback = Playback(float(recording.times[0]), float(recording.times[-1]))
             self._controls = PlaybackControls(server, self._playback, self._wishes)
-        add_show_folder(server, self.scene, self._wishes)
-        if recording is None:
+        else:
             self._sliders = JointSliders(server, source.model, 0.5 * self.scene.size, self._wishes)
         if recording is None or recording.has_loads:
-            with server.gui.add_folder("Joint load"):
-                self._legend = server.gui.add_html(
-                    legend(recording.largest if recording else (0, 0))
-                )
-                self._choice = JointChoice(server, self.scene, names, self._wishes)
-                if recording is not None:
-                    self._plot = LoadPlot(server, recording)
-                    self._plot.choose(0)
+            self._add_loads(server, recording, by_rating)
+        add_show_folder(server, self.scene, self._wishes)
+
+    def _add_loads(
+        self, server: viser.ViserServer, recording: Recording | None, by_rating: bool
+    ) -> None:
+        with server.gui.add_folder("Joint load"):
+            self._legend = server.gui.add_html(legend(self._largest, by_rating))
+            names = self._source.model.joint_names
+            self._choice = JointChoice(server, self.scene, names, self._wishes)
+            if recording is not None:
+                self._plot = LoadPlot(server, recording)
+                self._plot.choose(0)
+            causes = recording.causes if recording is not None else None
+            add_load_choices(
+                server,
+                causes.names if causes else [],
+                causes.chosen if causes else set(),
+                None if self._use is None else by_rating,
+                self._wishes,
+            )
 
     def step(self, seconds: float) -> None:
         """Let wall time pass and draw what changed."""
         wishes, self._wishes.redraw = self._wishes.redraw, False
         while self._wishes.toggles:
             self.scene.toggle(*self._wishes.toggles.popitem())
+        wishes = self._take_load_choices() or wishes
         if self._wishes.joint is not None:
             self._joint = self._source.model.joint_index(self._wishes.joint)
             self._wishes.joint = None
@@ -82,6 +101,26 @@ class View:
         else:
             self._draw_sample(self._source.recording, seconds, wishes)
 
+    def _take_load_choices(self) -> bool:
+        """Which causes are shown and what colours mean; whether anything has changed."""
+        changed = False
+        recording = self._source.recording
+        if self._wishes.causes and recording is not None and recording.causes is not None:
+            causes, changed = recording.causes, True
+            chosen = set(causes.chosen)
+            while self._wishes.causes:
+                name, shown = self._wishes.causes.popitem()
+                chosen = chosen | {name} if shown else chosen - {name}
+            causes.choose(sorted(chosen))
+            if self._plot is not None:
+                self._plot.choose(self._joint)
+        if self._wishes.by_rating is not None:
+            by_rating, self._wishes.by_rating = self._wishes.by_rating, None
+            self.scene.use = self._use if by_rating else None
+            self._legend.content = legend(self._largest, by_rating)
+            changed = True
+        return changed
+
     def _draw_pose(self) -> None:
         model, q = self._source.model, self._sliders.q.copy()
         loads = static_loads(model, q)
@@ -89,9 +128,10 @@ class View:
             float(np.linalg.norm(half, axis=1).max(initial=0.0))
             for half in (loads[:, :3], loads[:, 3:])
         )
+        self._largest = (largest[0], largest[1])
         self.scene.set_largest(*largest)
         self.scene.show(self.scene.at(q, loads))
-        self._legend.content = legend((largest[0], largest[1]))
+        self._legend.content = legend(self._largest, self.scene.use is not None)
         self._tell("held still: ", loads[self._joint])
 
     def _draw_sample(self, recording: Recording, seconds: float, forced: bool) -> None:
@@ -129,10 +169,11 @@ def show(
     open_browser: bool,
     started: Callable[[str], object],
     stop: threading.Event | None = None,
+    by_rating: bool = False,
 ) -> None:
     """Serve until Ctrl-C (or `stop`); `started` is told the address."""
     with running(host, port, source.title) as server:
-        view = View(server, source)
+        view = View(server, source, by_rating=by_rating)
         view.step(0.0)
         shown_host = "127.0.0.1" if host in ("0.0.0.0", "::", "") else host
         address = f"http://{shown_host}:{server.get_port()}"

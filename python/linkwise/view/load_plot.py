@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
     from linkwise.view.source import Recording
 
-_MOST_SAMPLES = 500
-_COLORS = ("#30363d", "#c0392b", "#2e8b57", "#2f6fb7")
-_HALVES = (("Force [N]", ("fx", "fy", "fz")), ("Moment [N m]", ("nx", "ny", "nz")))
+MOST_SAMPLES = 500
+COLORS = ("#30363d", "#c0392b", "#2e8b57", "#2f6fb7")
+HALVES = (("Force [N]", ("fx", "fy", "fz")), ("Moment [N m]", ("nx", "ny", "nz")))
 
 
 class LoadPlot:
@@ -28,10 +28,10 @@ class LoadPlot:
         self._dot = -1
         self._plots: list[Any] = []
         blank = np.zeros(2)
-        for title, labels in _HALVES:
+        for title, labels in HALVES:
             names = ("size", *labels)
             series: list[Any] = [{"label": "t [s]"}]
-            for name, color in zip(names, _COLORS, strict=True):
+            for name, color in zip(names, COLORS, strict=True):
                 width = 2 if name == "size" else 1
                 series.append({"label": name, "stroke": color, "width": width})
             dot = {"show": True, "size": 9, "fill": "#e67e22", "stroke": "#e67e22"}
@@ -49,7 +49,7 @@ class LoadPlot:
 
     def choose(self, joint: int) -> None:
         """Show the load of this joint; drawn with the next `show`."""
-        self._times, loads = self._recording.history(joint, _MOST_SAMPLES)
+        self._times, loads = self._recording.history(joint, MOST_SAMPLES)
         self._columns = [
             (np.linalg.norm(half, axis=1), *half.T) for half in (loads[:, :3], loads[:, 3:])
         ]

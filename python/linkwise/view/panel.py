@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from linkwise.view.arrows import color_bar
+from linkwise.view.arrows import color_bar, use_bar
 from linkwise.view.playback import SPEEDS, Playback
 
 if TYPE_CHECKING:
@@ -25,17 +26,50 @@ class Wishes:
 
     toggles: dict[str, bool] = field(default_factory=dict)
     joint: str | None = None
+    causes: dict[str, bool] = field(default_factory=dict)
+    by_rating: bool | None = None
     redraw: bool = False
 
 
-def legend(largest: tuple[float, float]) -> str:
-    """The colours' meaning as HTML."""
+def legend(largest: tuple[float, float], by_rating: bool = False) -> str:
+    """The meaning of colours and lengths as HTML."""
+    longest = f"{largest[0]:.4g} N (arrows), {largest[1]:.4g} N m (arcs)"
+    bar = use_bar() if by_rating else color_bar()
+    ends = ["0", "of the rating: 100 %", "over"] if by_rating else ["0", longest]
+    labels = "".join(f"<span>{end}</span>" for end in ends)
+    below = f"<div>longest: {longest}; grey: not rated</div>" if by_rating else ""
     return (
         '<div style="padding:4px 12px;font-size:12px">'
-        f'<div style="height:8px;border-radius:4px;background:{color_bar()}"></div>'
-        '<div style="display:flex;justify-content:space-between"><span>0</span>'
-        f"<span>{largest[0]:.4g} N (arrows), {largest[1]:.4g} N m (arcs)</span></div></div>"
+        f'<div style="height:8px;border-radius:4px;background:{bar}"></div>'
+        f'<div style="display:flex;justify-content:space-between">{labels}</div>{below}</div>'
     )
+
+
+def add_load_choices(
+    server: viser.ViserServer,
+    causes: Sequence[str],
+    chosen: set[str],
+    rated: bool | None,
+    wishes: Wishes,
+) -> None:
+    """Checkboxes of causes, and of the colours' meaning where there are ratings (None: none)."""
+    if rated is not None:
+        rating = server.gui.add_checkbox("Colour by rating", rated)
+
+        def recolor(event: Any) -> None:
+            wishes.by_rating = rating.value
+
+        rating.on_update(recolor)
+    if len(causes) < 2:
+        return
+    with server.gui.add_folder("Caused by"):
+        for name in causes:
+            box = server.gui.add_checkbox(name, name in chosen)
+
+            def note(event: Any, name: str = name, box: Any = box) -> None:
+                wishes.causes[name] = box.value
+
+            box.on_update(note)
 
 
 def add_show_folder(server: viser.ViserServer, scene: Scene, wishes: Wishes) -> None:

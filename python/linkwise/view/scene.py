@@ -31,6 +31,7 @@ from linkwise.view.shapes import (
 if TYPE_CHECKING:
     import viser
 
+    from linkwise.view.shown_loads import RatingUse
     from linkwise.view.source import Source
 
 _TONES = np.array([[86, 112, 140], [150, 170, 190]], dtype=np.uint8)
@@ -71,6 +72,8 @@ class Scene:
         self._inboard = np.array(model.joint_parents, dtype=int)
         self._largest = (0.0, 0.0)
         self.arrow_scale = 1.0
+        self.use: RatingUse | None = None
+        """Colours by use of the ratings; None: by size."""
         self._layers: dict[str, list[Layer]] = defaultdict(list)
         self.joint_marks: Any = None
         start = model.neutral_configuration()
@@ -264,7 +267,9 @@ class Scene:
                 return {}
             vectors = in_world(moment.joints, moment.loads)[half]
             longest = _ARROW_SHARE * self.size * self.arrow_scale
-            made = instances(moment.joints[:, :3, 3], vectors, self._largest[half], longest)
+            use = None if self.use is None else self.use.of(moment.loads, half)
+            points = moment.joints[:, :3, 3]
+            made = instances(points, vectors, self._largest[half], longest, use)
             return {
                 "batched_positions": made.positions,
                 "batched_wxyzs": made.quaternions,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,9 +13,12 @@ import numpy as np
 from linkwise._core import InputError, Model, inverse_dynamics_loads
 from linkwise.io.complaint import near
 from linkwise.io.urdf_visuals import Looks, read_looks
+from linkwise.scenario import load_ratings, load_scenario, ratings_in
 from linkwise.view.shapes import Array
+from linkwise.view.shown_loads import CauseLoads
 
 if TYPE_CHECKING:
+    from linkwise.loads.rating import Rating
     from linkwise.result import Run
 
 _BLOCK_BYTES = 64 << 20
@@ -27,19 +30,23 @@ class Options:
     """How to find a model and its looks.
 
     model: file to take model or looks from instead of the run's own; package_dirs, floating_base:
-    as in linkwise.load; loads: whether joint loads are shown.
+    as in linkwise.load; loads: whether joint loads are shown; ratings: a file of them instead of
+    the scenario's; causes: only the loads that these cause.
     """
 
     model: Path | None = None
     package_dirs: Sequence[Path] = ()
     floating_base: bool = False
     loads: bool = True
+    ratings: Path | None = None
+    causes: Sequence[str] = ()
 
 
 class Recording:
     """The samples of a run, read block by block: a run may be larger than memory.
 
-    times: (n,); largest: the largest force [N] and moment [N m] of all joints and samples.
+    times: (n,); largest: the largest force [N] and moment [N m] of all joints and samples; peaks:
+    the largest force of each joint [N]; causes: which causes' loads are shown.
     """
 
     def __init__(self, run: Run, model: Model, *, loads: bool) -> None:
@@ -53,8 +60,12 @@ class Recording:
         self._positions = np.zeros((0, model.nq))
         self._loads = np.zeros((0, model.n_joints, 6))
         self.largest = (0.0, 0.0)
+        self.peaks: Array = np.zeros(model.n_joints)
+        self.causes: CauseLoads | None = None
         if loads:
+            self.causes = CauseLoads(run, model)
             peaks = run.peak_loads()
+            self.peaks = np.asarray(peaks["force"].values)
             self.largest = (float(peaks["force"].max()), float(peaks["moment"].max()))
 
     def _check(self, run: Run, model: Model) -> None:
@@ -94,14 +105,22 @@ class Recording:
         return np.asarray(self._positions[row])
 
     def load(self, sample: int) -> Array:
-        """Loads (n_joints, 6) in the joint frames."""
+        """Loads (n_joints, 6) in the joint frames, of the chosen causes."""
+        if self.causes is not None and not self.causes.everything:
+            return self.causes.load(sample)
         row = self._read(sample)
         return np.asarray(self._loads[row])
 
     def history(self, joint: int, most: int) -> tuple[Array, Array]:
-        """Times (n,) and loads (n, 6) of one joint, at most `most` evenly spaced samples."""
-        load = self._dataset["joint_load"].transpose("time", "joint", "component")[:, joint]
+        """Times (n,) and loads (n, 6) of one joint, at most `most` evenly spaced samples.
+
+        Of the chosen causes, like `load`.
+        """
         chosen = np.unique(np.linspace(0, self.times.size - 1, most).astype(int))
+        if self.causes is not None and not self.causes.everything:
+            chosen, loads = self.causes.history(joint, chosen)
+            return self.times[chosen], loads
+        load = self._dataset["joint_load"].transpose("time", "joint", "component")[:, joint]
         return self.times[chosen], np.asarray(load.values[chosen])
 
 
@@ -113,6 +132,7 @@ class Source:
     model: Model
     looks: Looks
     recording: Recording | None = None
+    ratings: Mapping[str, Rating] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
 
@@ -132,15 +152,23 @@ def open_source(target: PathLike, options: Options) -> Source:
         return _open_run(path, options)
     if options.model is not None:
         raise InputError(f"{str(path)!r}: --model goes with a run, and this is a file; remove it")
+    if options.causes:
+        raise InputError(f"{str(path)!r}: causes go with a run, and this is a file; leave them out")
     model, file, package_dirs = _load_model(path, options)
     looks = Looks([], [], []) if file is None else read_looks(file, package_dirs)
-    return Source(model.name, model, looks, None, _notes(looks))
+    held = load_scenario(path).text if path.suffix.lower() == ".toml" else ""
+    ratings = _ratings(options, held)
+    return Source(model.name, model, looks, None, ratings, _notes(looks))
+
+
+def _ratings(options: Options, scenario: str) -> Mapping[str, Rating]:
+    """Those of the file that the options name, or of the scenario's text."""
+    return ratings_in(scenario) if options.ratings is None else load_ratings(options.ratings)
 
 
 def _load_model(path: Path, options: Options) -> tuple[Model, Path | None, Sequence[Path]]:
     """The model of a file, the file that may say how it looks, and where its packages are."""
     from linkwise.io.load import load
-    from linkwise.scenario import load_scenario
 
     if path.suffix.lower() != ".toml":
         model = load(path, floating_base=options.floating_base, package_dirs=options.package_dirs)
@@ -169,7 +197,12 @@ def _open_run(path: Path, options: Options) -> Source:
         if set(looks.links) - set(model.link_names):  # another machine under the same name
             looks = Looks([], [], [])
     recording = Recording(run, model, loads=options.loads)
-    return Source(model.name, model, looks, recording, _notes(looks))
+    if options.causes:
+        if recording.causes is None:
+            raise InputError("causes: are those of loads, and --no-loads hides them; leave one out")
+        recording.causes.choose(options.causes)
+    ratings = _ratings(options, str(run.dataset.attrs.get("scenario", "")))
+    return Source(model.name, model, looks, recording, ratings, _notes(looks))
 
 
 def _file_beside(path: Path, name: str) -> Path | None:

@@ -72,6 +72,37 @@ def test_model_of_another_machine(linkwise, run_path, tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["--color", "size_"], ["--color", "use size or rating"]),
+        (["--color", "rating"], ["there are no ratings", "--ratings"]),
+        (["--ratings", "wrong.toml"], ["'elbow_pich'", "did you mean 'elbow_pitch'"]),
+        (["--ratings", "nowhere.toml"], ["nowhere.toml"]),
+        (["--cause", "grvity"], ["'grvity'", "use gravity, velocity"]),
+        (["--cause", "external"], ["'external'", "the run has none; it has gravity, velocity"]),
+        (["--cause", "gravity", "--no-loads"], ["--no-loads"]),
+    ],
+)
+def test_loads_that_cannot_be_shown(linkwise, run_path, tmp_path, arguments, parts):
+    (tmp_path / "wrong.toml").write_text("[rating.elbow_pich]\nradial = 3\n")
+    refuse(linkwise("view", run_path, "--export", "a.html", *arguments), *parts)
+    assert not (tmp_path / "a.html").exists()
+
+
+def test_causes_of_a_run_that_lacks_what_they_need(linkwise, tmp_path):
+    kept = ["position", "joint_load"]
+    lw.simulate(lw.scenes.chain(2), duration=0.1, quantities=kept, output=tmp_path / "r.zarr")
+    result = linkwise("view", "r.zarr", "--export", "a.html", "--cause", "gravity")
+    refuse(result, "'gravity'", 'record the quantity "velocity"')
+
+
+def test_causes_of_a_model(linkwise, tmp_path):
+    (tmp_path / "c.toml").write_text("[model.chain]\nn_bodies = 2\n[simulate]\nduration = 1\n")
+    result = linkwise("view", "c.toml", "--export", "a.html", "--cause", "gravity")
+    refuse(result, "c.toml", "causes go with a run")
+
+
 def test_model_option_with_a_model(linkwise, tmp_path):
     (tmp_path / "c.toml").write_text("[model.chain]\nn_bodies = 2\n[simulate]\nduration = 1\n")
     refuse(linkwise("view", "c.toml", "--model", "c.toml", "--export", "a.html"), "--model")

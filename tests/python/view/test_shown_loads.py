@@ -1,0 +1,131 @@
+"""Loads of chosen causes and colours by rating, and what the exported page holds of them."""
+
+import base64
+import json
+import re
+
+import numpy as np
+import pytest
+
+import linkwise as lw
+from helpers.loaded_arm import arm, profile
+from linkwise.view.arrows import colors_of_use
+from linkwise.view.export import write_html
+from linkwise.view.shown_loads import RatingUse, rating_use
+from linkwise.view.source import Options, open_source
+
+
+@pytest.fixture(scope="module")
+def loaded_path(tmp_path_factory):
+    """A run with every cause."""
+    path = tmp_path_factory.mktemp("run") / "loaded.zarr"
+    lw.simulate(
+        arm(),
+        duration=1.0,
+        every=0.01,
+        drives={"shoulder": lw.Motion(profile(0.8, 1.0)), "elbow": 3.0},
+        wrenches={"hand": lw.Wrench([5.0, -3.0, 2.0, 0.1, 0.2, -0.3])},
+        q0=[0, 0.3, 0.25],
+        output=path,
+    )
+    return path
+
+
+def test_chosen_causes_are_their_shares(loaded_path):
+    run = lw.open_run(loaded_path)
+    shares = lw.loads.split(run)
+    for chosen in (["gravity"], ["drive", "motion", "passive"], []):
+        recording = open_source(loaded_path, Options()).recording
+        recording.causes.choose(chosen)
+        expected = shares.sel(cause=chosen).sum("cause").transpose("time", "joint", "component")
+        for sample in (0, 63, 64, 100, 7):  # the blocks of samples end in between
+            np.testing.assert_allclose(recording.load(sample), expected[sample], atol=1e-11)
+        times, loads = recording.history(1, 30)
+        at = np.searchsorted(run.time.values, times)
+        assert times.size == 30
+        np.testing.assert_allclose(loads, expected[at, 1], atol=1e-11)
+
+
+def test_all_causes_are_the_load(loaded_path):
+    recording = open_source(loaded_path, Options()).recording
+    assert recording.causes.names == [
+        "gravity",
+        "velocity",
+        "drive",
+        "motion",
+        "passive",
+        "external",
+    ]
+    total = lw.open_run(loaded_path).joint_load.values
+    recording.causes.choose(recording.causes.names[:2])
+    recording.causes.choose(recording.causes.names)
+    assert np.array_equal(recording.load(50), total[50])
+
+
+def test_use_is_that_of_the_margins(loaded_path):
+    run = lw.open_run(loaded_path)
+    ratings = {
+        "shoulder": lw.loads.Rating(radial=60, axial=5, torque=20),
+        "elbow": lw.loads.Rating(tilting_moment=3),
+    }
+    use = RatingUse(arm(), ratings)
+    uses = np.array([[use.of(load, half) for half in (0, 1)] for load in run.joint_load.values])
+    found = lw.loads.margins(lw.loads.summary(run), ratings).use
+    forces, moments = ["axial", "radial"], ["torque", "tilting_moment"]
+    expected = [
+        found.sel(joint=["shoulder", "elbow", "wrist"], quantity=names).max("quantity").values
+        for names in (forces, moments)
+    ]
+    np.testing.assert_allclose(uses.max(axis=0), expected, rtol=1e-12)
+    assert np.isnan(uses[:, 0, 1:]).all()
+
+
+def test_colours_of_use_have_a_step_at_the_rating():
+    blue, below, at, above, unrated = colors_of_use(np.array([0, 0.999, 1.0, 1.001, np.nan]))
+    steps = [np.abs(a.astype(int) - b).max() for a, b in ((below, at), (at, above))]
+    assert steps[0] <= 1
+    assert steps[1] > 60
+    assert len({tuple(c) for c in (blue, at, above, unrated)}) == 4
+    assert np.ptp(unrated) == 0
+
+
+def test_ratings_come_from_the_scenario_or_a_file(linkwise, tmp_path):
+    scenario = tmp_path / "c.toml"
+    scenario.write_text(
+        "[model.chain]\nn_bodies = 3\n[rating.joint_2]\nforce = 5\n[simulate]\nduration = 0.1\n"
+    )
+    (tmp_path / "other.toml").write_text("[rating.joint_1]\nmoment = '2 N m'\n")
+    assert linkwise("run", scenario, "-o", "run.zarr").code == 0
+    for target in ("c.toml", "run.zarr"):
+        assert open_source(target, Options()).ratings == {"joint_2": lw.loads.Rating(force=5)}
+        other = open_source(target, Options(ratings=tmp_path / "other.toml"))
+        assert other.ratings == {"joint_1": lw.loads.Rating(moment=2)}
+        assert rating_use(other, True).known
+
+
+def plotted(page):
+    """Names, times and loads that the page plots."""
+    content = json.loads(
+        re.search(r"<script type='application/json' id='linkwise-loads'>(.*?)</script>", page)[1]
+    )
+
+    def numbers(packed):
+        return np.frombuffer(base64.b64decode(packed["bdata"]), "<f4")
+
+    names = re.findall(r"<option>(.*?)</option>", page)
+    return names, numbers(content["times"]), [numbers(x).reshape(-1, 6) for x in content["loads"]]
+
+
+@pytest.mark.parametrize("causes", [[], ["gravity", "drive"]])
+def test_exported_page_plots_what_the_arrows_show(loaded_path, tmp_path, causes):
+    pytest.importorskip("viser", reason="the view needs viser: pip install '.[view]'")
+    written = write_html(open_source(loaded_path, Options(causes=causes)), tmp_path / "a.html")
+    page = written.path.read_text(encoding="utf-8")
+    names, times, loads = plotted(page)
+    run = lw.open_run(loaded_path)
+    assert names == ["shoulder", "elbow", "wrist"]
+    np.testing.assert_allclose(times, run.time, rtol=1e-6)
+    expected = lw.loads.split(run).sel(cause=causes).sum("cause") if causes else run.joint_load
+    for name, load in zip(names, loads, strict=True):
+        np.testing.assert_allclose(load, expected.sel(joint=name), rtol=1e-5, atol=1e-4)
+    assert ("caused by drive, gravity" in page) == bool(causes)
