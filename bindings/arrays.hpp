@@ -3,6 +3,7 @@
 // into such an array (lists, integers, other strides) is turned; the common case costs no Python
 // call on the way in, one on the way out, and no allocation of its own.
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <initializer_list>
 #include <string>
@@ -96,7 +97,7 @@ class ArrayIn {
       view_ = {};
       return false;
     }
-    if (view_.format && std::strcmp(view_.format, "d") == 0) return true;
+    if (view_.format && is_double(view_.format)) return true;
     PyBuffer_Release(&view_);
     return false;
   }
@@ -109,6 +110,13 @@ class ArrayIn {
   nb::object object() const { return nb::borrow<nb::object>(nb::handle(view_.obj)); }
 
  private:
+  /// Zarr's arrays say their byte order, which NumPy's copies of them then do too.
+  static bool is_double(const char* format) {
+    const char order = std::endian::native == std::endian::little ? '<' : '>';
+    if (*format == '@' || *format == '=' || *format == order) ++format;
+    return std::strcmp(format, "d") == 0;
+  }
+
   Py_buffer view_{};
 };
 

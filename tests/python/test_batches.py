@@ -111,11 +111,21 @@ def test_shapes_that_do_not_fit_are_named():
         np.array([[1, 2, 3]], dtype=np.int32),
         np.array([[1, 2, 3]], dtype=np.float32),
         np.array([[1, 2, 3]], dtype=">f8"),
+        np.array([[1, 2, 3]], dtype=np.dtype(float).newbyteorder("<")),  # as Zarr's arrays are
         np.asfortranarray(np.arange(12.0).reshape(4, 3)),
         np.arange(24.0).reshape(4, 6)[:, ::2],
         np.arange(12.0).reshape(4, 3)[::-1],
     ],
-    ids=["lists", "int32", "float32", "big-endian", "fortran", "strided", "reversed"],
+    ids=[
+        "lists",
+        "int32",
+        "float32",
+        "big-endian",
+        "little-endian",
+        "fortran",
+        "strided",
+        "reversed",
+    ],
 )
 def test_whatever_numpy_can_turn_into_numbers(given):
     model = lw.scenes.chain(3)
