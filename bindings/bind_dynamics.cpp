@@ -2,6 +2,7 @@
 #include <nanobind/stl/string.h>
 
 #include "bind.hpp"
+#include "linkwise/constraint/joint_constraint.hpp"
 #include "linkwise/forces/passive.hpp"
 #include "linkwise/integrate/integrator.hpp"
 #include "linkwise/solve/registry.hpp"
@@ -135,13 +136,15 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
   std::unique_ptr<DynamicsMethod> own;
   DynamicsMethod* other = nullptr;
   PyModel::Lease scratch(self);
-  if (method == "auto" && plain && s.count == 1 &&
-      scratch->default_choice().method == "piecewise") {
-    other = &scratch->piecewise(team);
-    report.method = "piecewise";
-    report.solver = "thomas";
+  BatchMethod on_lanes = BatchMethod::articulated_body;
+  if (plain && s.count == 1 && scratch->shared_by_threads()) {
+    const Choice choice =
+        method == "auto" ? scratch->default_choice() : Choice{method, "", "as asked for"};
+    other = &scratch->method(choice.method, team);
+    report.method = choice.method;
+    report.solver = choice.solver;
     if (!untouched) dynamics_options(asked);
-    if (full) report.reason = scratch->default_choice().reason;
+    if (full) report.reason = choice.reason;
   } else if (plain) {
     report.method = "articulated_body";
     if (untouched && method == "auto" && scratch->default_choice().method == report.method)
@@ -155,8 +158,14 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
     report.method = choice.method;
     report.solver = choice.solver;
     report.reason = choice.reason;
-    own = make_dynamics(m, options);
-    other = own.get();
+    if (s.count > 1 && !full && untouched && choice.method == "constraint_force" &&
+        choice.solver == "thomas") {
+      require_regular_inertias(m);
+      on_lanes = BatchMethod::constraint_force;
+    } else {
+      own = make_dynamics(m, options);
+      other = own.get();
+    }
   }
   const double scratch_bytes = 8.0 * s.count * m.nv() * (passive || !s.tau.given);
   const double result_bytes = 8.0 * s.count * (m.nv() + (with_loads ? 6.0 * m.n_joints() : 0));
@@ -192,9 +201,9 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
       in.gravity_factor = gravity;
       std::atomic<int> body{-1};
       const auto part = [&](BatchEvaluator& batch, size_t first, size_t count) {
-        const int failed =
-            batch.forward_dynamics(count, rows_from(m, in, first), du.data + first * m.nv(),
-                                   loads ? loads->data + first * 6 * m.n_joints() : nullptr);
+        const int failed = batch.forward_dynamics(
+            count, rows_from(m, in, first), du.data + first * m.nv(),
+            loads ? loads->data + first * 6 * m.n_joints() : nullptr, on_lanes);
         for (int seen = body; failed > seen && !body.compare_exchange_weak(seen, failed);) {
         }
       };

@@ -3,6 +3,7 @@
 // several threads each have one and repeated calls allocate none.
 #include <memory>
 #include <mutex>
+#include <string>
 
 #include <nanobind/nanobind.h>
 
@@ -11,6 +12,7 @@
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
 #include "linkwise/exec/thread_pool.hpp"
+#include "linkwise/kinematics/branches.hpp"
 
 namespace linkwise::bindings {
 
@@ -39,22 +41,28 @@ struct Scratch {
     if (choice_.method.empty()) choice_ = choose_dynamics(*model_, {});
     return choice_;
   }
-  DynamicsMethod& piecewise(int threads) {
-    if (!piecewise_ || piecewise_threads_ != threads) {
+  /// Is the model so large that the method of one state keeps pieces or branches for threads?
+  bool shared_by_threads() {
+    if (shared_ < 0) shared_ = default_choice().method == "piecewise" || Branches(*model_).any();
+    return shared_ > 0;
+  }
+  DynamicsMethod& method(const std::string& name, int threads) {
+    if (!method_ || method_name_ != name || method_threads_ != threads) {
       DynamicsOptions options;
-      options.method = "piecewise";
-      options.threads = piecewise_threads_ = threads;
-      piecewise_ = make_dynamics(*model_, options);
+      options.method = method_name_ = name;
+      options.threads = method_threads_ = threads;
+      method_ = make_dynamics(*model_, options);
     }
-    return *piecewise_;
+    return *method_;
   }
 
  private:
   const Model* model_;
   std::unique_ptr<CompositeRigidBody> composite_;
-  std::unique_ptr<DynamicsMethod> piecewise_;
+  std::unique_ptr<DynamicsMethod> method_;
+  std::string method_name_;
   Choice choice_;
-  int piecewise_threads_ = 0;
+  int method_threads_ = 0, shared_ = -1;
 };
 
 class PyModel {

@@ -36,7 +36,7 @@ class ArticulatedBody {
   bool evaluate(const SweepInput<S>& in, S* du, S* loads) {
     failed_body_ = -1;
     if (loads && eliminated_.empty()) eliminated_.resize(model_->n_bodies());
-    if (branches_ && !branches_->shares.empty()) {
+    if (branches_ && branches_->any()) {
       evaluate_branches(in, du, loads);
     } else {
       calc_velocities(in, model_->runs);
@@ -56,7 +56,7 @@ class ArticulatedBody {
   void share_branches(int threads) {
     branches_ = std::make_unique<Branches>(*model_);
     threads_ = threads;
-    if (branches_->shares.empty()) return;
+    if (!branches_->any()) return;
     given_of_.assign(model_->n_bodies(), -1);
     for (const Run& run : branches_->trunk)
       std::fill(given_of_.begin() + run.begin, given_of_.begin() + run.end, in_trunk);

@@ -19,6 +19,7 @@ struct Branches {
 
   /// Empty, no shares, where cutting would not halve what has to be done one after the other.
   explicit Branches(const Model& model);
+  bool any() const { return !shares.empty(); }
 };
 
 }  // namespace linkwise
