@@ -10,6 +10,11 @@ namespace {
 
 using Group = Lanes<native_lanes>;
 
+/// Below, three barriers of a microsecond cost more than a second thread saves.
+constexpr int fewest_for_threads = 128;
+
+int threads_for(int n_bodies, int threads) { return n_bodies < fewest_for_threads ? 1 : threads; }
+
 HingePlacement<double> placement(const BodyConstants<double>& k) {
   return {k.cos_alpha, k.sin_alpha, k.a, k.d};
 }
@@ -37,7 +42,7 @@ class PiecewiseChain {
  public:
   PiecewiseChain(const Model& model, const DynamicsOptions& options)
       : model_(model),
-        threads_(checked_threads(options.threads)),
+        threads_(threads_for(model.n_bodies(), checked_threads(options.threads))),
         n_(model.n_bodies()),
         n_pieces_(Piecewise::pieces(n_)),
         length_((n_ + n_pieces_ - 1) / n_pieces_),
@@ -92,11 +97,9 @@ class PiecewiseChain {
               if (const int n = body_at(g, l, static_cast<int>(k)); n < n_) du[n] = rate[l];
           },
           loads != nullptr);
+      if (loads) store_loads(g, loads);
     });
     cut_rates(du);
-    if (loads)
-      store_joint_loads(
-          model_, in.q, [&](int n) { return load_of(n); }, loads);
     return report;
   }
 
@@ -258,10 +261,14 @@ class PiecewiseChain {
     }
   }
 
-  Force<double> load_of(int n) const {
-    const int s = n / length_;
-    return get_lanes<Force<double>>(groups_[s / native_lanes].state[n % length_].U,
-                                    s % native_lanes);
+  void store_loads(int g, double* loads) const {
+    for (int l = 0; l < native_lanes; ++l)
+      for (int k = 0; k < length_; ++k) {
+        const int n = body_at(g, l, k);  // and the number of its joint
+        if (n >= n_) return;
+        store_joint_load(model_, n, in_->q, get_lanes<Force<double>>(groups_[g].state[k].U, l),
+                         loads + 6 * n);
+      }
   }
 
   const Model& model_;

@@ -176,28 +176,31 @@ LW_INLINE void copy_prescribed(const Model& model, const BodyTopology& body,
   }
 }
 
-/// Joint loads in the user's joint frames, [n_joints][6], from wrench(n), body n's in its own
-/// frame. A joint inside a stack carries the same wrench as the body, moved to its own point.
+/// Load of joint j in the user's joint frame, [6], from the wrench on its body in the body's own. A
+/// joint inside a stack carries the same wrench as the body, moved to its own point.
+template <class S>
+LW_INLINE void store_joint_load(const Model& model, int j, const S* q, Force<S> w, S* out) {
+  const JointInfo& joint = model.joints[j];
+  if (!joint.last_of_body) {
+    const BodyTopology& body = model.topology[joint.body];
+    for (int e = body.first_element + body.n_elements - 1;
+         e >= joint.first_element + joint.n_elements; --e)
+      w = transpose_times(element_pose(model.elements[e], q), w);
+  }
+  const Force<S> user = inverse_transpose_times(joint.to_user, w);
+  out[0] = user.lin.x;
+  out[1] = user.lin.y;
+  out[2] = user.lin.z;
+  out[3] = user.ang.x;
+  out[4] = user.ang.y;
+  out[5] = user.ang.z;
+}
+
+/// Joint loads [n_joints][6] from wrench(n), body n's in its own frame.
 template <class S, class W>
 void store_joint_loads(const Model& model, const S* q, W&& wrench, S* loads) {
-  for (int j = model.n_joints() - 1; j >= 0; --j) {
-    const JointInfo& joint = model.joints[j];
-    Force<S> w = wrench(joint.body);
-    if (!joint.last_of_body) {
-      const BodyTopology& body = model.topology[joint.body];
-      for (int e = body.first_element + body.n_elements - 1;
-           e >= joint.first_element + joint.n_elements; --e)
-        w = transpose_times(element_pose(model.elements[e], q), w);
-    }
-    const Force<S> user = inverse_transpose_times(joint.to_user, w);
-    S* out = loads + 6 * j;
-    out[0] = user.lin.x;
-    out[1] = user.lin.y;
-    out[2] = user.lin.z;
-    out[3] = user.ang.x;
-    out[4] = user.ang.y;
-    out[5] = user.ang.z;
-  }
+  for (int j = model.n_joints() - 1; j >= 0; --j)
+    store_joint_load<S>(model, j, q, wrench(model.joints[j].body), loads + 6 * j);
 }
 
 }  // namespace linkwise
