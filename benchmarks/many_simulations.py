@@ -1,0 +1,163 @@
+"""Many simulations of one arm at once, beside one by one and beside MuJoCo's rollouts.
+
+    python benchmarks/many_simulations.py [-o benchmarks/results] [--members 1024]
+
+The chain of seven joints of `linkwise bench` moves for a second from as many states, by steps of
+1 ms of the classical Runge-Kutta method; end positions are compared before anything is timed. Time
+is that of the processor, all threads together, the best of five. MuJoCo (`mujoco.rollout`, no
+contacts, constraints and sensors) takes part where it is installed; it finds no joint loads, and
+records every step as its interface has it. Writes many_simulations.json and many_simulations.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import linkwise as lw
+from linkwise import _core
+from linkwise.bench.machine import random_chain, random_states, read_bodies, write_machine
+from linkwise.record.provenance import versions
+
+STEP, STEPS, JOINTS = 1e-3, 1000, 7
+EVALUATIONS = 4  # a step
+SLOW = 32  # members that are simulated one by one: more would only take longer
+
+
+def mujoco_rollouts(machine: Any, q: np.ndarray, v: np.ndarray) -> Callable[[int], np.ndarray]:
+    import mujoco
+    import mujoco.rollout
+
+    from linkwise.bench.engines.mujoco import _model
+
+    with tempfile.TemporaryDirectory() as folder:
+        write_machine(machine, Path(folder))
+        gravity, bodies = read_bodies(Path(folder))
+    model = _model(mujoco, gravity, bodies)
+    model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, STEP
+    states = np.hstack([np.zeros((len(q), 1)), q, v])
+    data = mujoco.MjData(model)
+
+    def run(count: int) -> np.ndarray:
+        found, _ = mujoco.rollout.rollout(model, data, states[:count], nstep=STEPS)
+        return np.asarray(found)[:, -1, 1 : 1 + JOINTS]
+
+    return run
+
+
+def contestants(members: int) -> dict[str, tuple[int, Callable[[int], np.ndarray]]]:
+    """Name: how many members it simulates, and how."""
+    machine = random_chain(JOINTS)
+    drawn = random_states(machine, members)
+    model, q, v = machine.model, drawn.q, drawn.v
+    end = STEP * STEPS
+
+    def at_once(count: int, *quantities: str) -> np.ndarray:
+        batch = lw.simulate_batch(
+            model,
+            q0=q[:count],
+            v0=v[:count],
+            times=[end],
+            step=STEP,
+            threads=1,
+            quantities=("position", *quantities),
+        )
+        found: np.ndarray = batch.position.values[:, 0]
+        return found
+
+    def one_by_one(count: int) -> np.ndarray:
+        ends = []
+        for k in range(count):
+            run = lw.simulate(
+                model,
+                q0=q[k],
+                v0=v[k],
+                times=[end],
+                step=STEP,
+                integrator="runge_kutta_4",
+                threads=1,
+                quantities=["position"],
+            )
+            ends.append(run.position.values[0])
+        return np.array(ends)
+
+    found = {
+        "simulate_batch": (members, at_once),
+        "simulate_batch, joint loads": (members, lambda count: at_once(count, "joint_load")),
+        "simulate, one by one": (min(SLOW, members), one_by_one),
+    }
+    if importlib.util.find_spec("mujoco"):
+        found["MuJoCo rollout"] = (min(8 * SLOW, members), mujoco_rollouts(machine, q, v))
+    return found
+
+
+def measure(members: int) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    expected = None
+    for name, (count, run) in contestants(members).items():
+        ends = run(count)
+        expected = ends if expected is None else expected
+        error = float(np.abs(ends - expected[:count]).max())
+        if error > 1e-6:
+            raise SystemExit(f"{name} ends {error:.1e} rad away from simulate_batch")
+        seconds = []
+        for _ in range(5):
+            started = time.process_time()
+            run(count)
+            seconds.append(time.process_time() - started)
+        each = min(seconds) / count
+        rows.append(
+            {
+                "what": name,
+                "members": count,
+                "ms_a_member": 1e3 * each,
+                "ns_a_body_and_evaluation": 1e9 * each / (STEPS * EVALUATIONS * JOINTS),
+                "times_real_time": STEP * STEPS / each,
+                "deviation": error,
+            }
+        )
+    for row in rows:
+        row["ratio"] = row["ms_a_member"] / rows[0]["ms_a_member"]
+    return rows
+
+
+def markdown(rows: list[dict[str, Any]]) -> str:
+    lines = [
+        "| one core | ms a member | ns a body and evaluation | times real time | ratio |",
+        "|---|---:|---:|---:|---:|",
+    ]
+    lines += [
+        f"| {row['what']} | {row['ms_a_member']:.3g} | {row['ns_a_body_and_evaluation']:.3g} "
+        f"| {row['times_real_time']:,.0f} | {row['ratio']:.2g} |"
+        for row in rows
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--members", type=int, default=1024)
+    arguments = parser.parse_args()
+    rows = measure(arguments.members)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    about = {"versions": versions(), "cpu_target": _core.cpu_target, "rows": rows}
+    text = markdown(rows)
+    for name, content in {
+        "many_simulations.json": json.dumps(about, indent=1) + "\n",
+        "many_simulations.md": f"{text}\n\n`python benchmarks/many_simulations.py`\n",
+    }.items():
+        (arguments.output / name).write_text(content, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
