@@ -2,15 +2,18 @@
 
     python benchmarks/publish.py NAME [--no-run]
 
-Writes benchmarks/results/NAME (bench.json, bench.md, figures) by `linkwise bench`, then replaces
-the text between the marks <!-- bench-table --> in README.md and <!-- bench-targets --> in
-docs/performance.md. With --no-run it takes the results that are there.
+Writes benchmarks/results/NAME (bench.json, bench.md, figures) by `linkwise bench`, and there too
+what instructions.py, many_simulations.py and huge_chains.py beside this file find; then replaces
+the text between the marks <!-- bench-table --> in README.md and <!-- bench-targets -->,
+<!-- many-simulations --> and <!-- huge-chains --> in docs/performance.md. With --no-run it takes
+the results that are there.
 """
 
 from __future__ import annotations
 
 import argparse
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -18,6 +21,9 @@ from linkwise.bench.report import short_table, target_table
 from linkwise.bench.run import Result, read, run_bench, write
 
 ROOT = Path(__file__).resolve().parents[1]
+#: Scripts beside this one that write NAME.md into a folder; the first has no table of its own in
+#: the documents.
+OTHERS = ("instructions", "many_simulations", "huge_chains")
 
 
 def replaced(text: str, mark: str, new: str) -> str:
@@ -53,16 +59,20 @@ def main() -> None:
     if not arguments.no_run:
         say = lambda message: print(message, file=sys.stderr)  # noqa: E731
         write(run_bench(sources=ROOT, say=say), folder)
+        for name in OTHERS:
+            say(f"{name}.py")
+            script = ROOT / "benchmarks" / f"{name}.py"
+            subprocess.run([sys.executable, script, "-o", folder], check=True)
     result = read(folder / "bench.json")
     table = short_table(result.rows)
     line = conditions_line(result, arguments.name, "benchmarks/results")
     put(ROOT / "README.md", "bench-table", f"{table}\n\n{line}")
     line = conditions_line(result, arguments.name, "../benchmarks/results")
-    put(
-        ROOT / "docs" / "performance.md",
-        "bench-targets",
-        f"{target_table(result.targets)}\n\n{line}",
-    )
+    performance = ROOT / "docs" / "performance.md"
+    put(performance, "bench-targets", f"{target_table(result.targets)}\n\n{line}")
+    for name in OTHERS[1:]:
+        text = (folder / f"{name}.md").read_text(encoding="utf-8")
+        put(performance, name.replace("_", "-"), text.rpartition("`python")[0])
 
 
 if __name__ == "__main__":
