@@ -161,7 +161,7 @@ class ArticulatedBody {
             pose_[n] = J::pose(k.tree, k.pitch, in.q[body.q]);
           Motion<S> v = seen_at_child<J>(n, v_parent);
           J::add_rate(v, k.pitch, in.v ? in.v[body.v] : S{});
-          w.v = v;
+          store(w.v, v);
         }
         w.p = cross_dual(w.v, k.inertia * w.v);
       }
@@ -222,7 +222,7 @@ class ArticulatedBody {
           check(D, n);
           const S D_inverse = 1.0 / D;
           const S u = in.tau[body.v] - J::project(w.p, k.pitch);
-          w.U = U;
+          store(w.U, U);
           w.D_inverse = D_inverse;
           w.u = u;
           if (!with_loads && body.parent < 0) continue;
@@ -286,7 +286,7 @@ class ArticulatedBody {
       e.Y.C.m[0] = Z.xx;
       e.Y.C.m[1] = Z.xy;
       e.Y.C.m[2] = Z.yy;
-      e.p = p;
+      store(e.p, p);
     }
     if (body.parent < 0) return;
     if constexpr (J::is_hinge) {
@@ -388,8 +388,8 @@ class ArticulatedBody {
           const S rate = w.D_inverse * (w.u - dot(a, w.U));
           du[body.v] = rate;
           J::add_rate(a, k.pitch, rate);
-          w.v = a;
-          if constexpr (with_loads) w.U = joint_load;
+          store(w.v, a);
+          if constexpr (with_loads) store(w.U, joint_load);
         }
       }
     });

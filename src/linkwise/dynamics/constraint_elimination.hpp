@@ -362,17 +362,6 @@ class ConstraintElimination {
     }
   }
 
-  /// Component by component: a copy of the whole would read in wide words what was just written in
-  /// narrow ones, a stall of a dozen cycles.
-  static LW_INLINE void store(Force<S>& to, const Force<S>& f) {
-    to.lin.x = f.lin.x;
-    to.lin.y = f.lin.y;
-    to.lin.z = f.lin.z;
-    to.ang.x = f.ang.x;
-    to.ang.y = f.ang.y;
-    to.ang.z = f.ang.z;
-  }
-
   template <bool response>
   void base_to_tip(const SweepInput<S>& in, S* du) {
     const Model& model = *model_;

@@ -35,6 +35,19 @@ LW_INLINE Force<A>& operator-=(Force<A>& a, const Force<B>& b) {
   a.ang -= b.ang;
   return a;
 }
+/// to = f, component by component: where the components were just computed, a copy of the whole may
+/// be made through memory and read in wide words what was written in narrow ones, a stall of a
+/// dozen cycles.
+template <class Spatial>
+LW_INLINE void store(Spatial& to, const Spatial& f) {
+  to.lin.x = f.lin.x;
+  to.lin.y = f.lin.y;
+  to.lin.z = f.lin.z;
+  to.ang.x = f.ang.x;
+  to.ang.y = f.ang.y;
+  to.ang.z = f.ang.z;
+}
+
 template <class A, class B>
 LW_INLINE Wider<A, B> dot(const Motion<A>& v, const Force<B>& f) {
   return dot(v.lin, f.lin) + dot(v.ang, f.ang);
