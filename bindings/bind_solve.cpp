@@ -7,6 +7,7 @@
 
 #include "arrays.hpp"
 #include "bind.hpp"
+#include "interrupt.hpp"
 #include "linkwise/constraint/tree_system.hpp"
 #include "linkwise/dynamics/serial_part.hpp"
 #include "linkwise/forces/passive.hpp"
@@ -307,10 +308,11 @@ nb::dict PyEvaluator::follow(nb::handle times_in, nb::handle q, nb::handle v, nb
   NewArray du({rows.count}, {size(m.nv())});
   std::vector<double> seconds, iterations, errors;
   std::vector<Outcome> outcomes;
+  Interrupt interrupt;
   {
     const nb::gil_scoped_release release;
     const Clock::time_point begin = Clock::now();
-    for (size_t i = 0; i < rows.count; ++i) {
+    for (size_t i = 0; i < rows.count && !interrupt(); ++i) {
       const SweepInput<double> in = rows.input(m, i);
       const Clock::time_point started = Clock::now();
       const DynamicsReport report =
@@ -323,6 +325,7 @@ nb::dict PyEvaluator::follow(nb::handle times_in, nb::handle q, nb::handle v, nb
       if (seconds_since(begin) > time_limit) break;
     }
   }
+  interrupt.rethrow();
   nb::list names;
   for (Outcome outcome : outcomes) names.append(std::string(to_string(outcome)));
   nb::dict out;
