@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from linkwise.bench.cases.simulation import time_at
+from linkwise.bench.cases.simulation import Point, give_up, time_at
 from linkwise.bench.compiling import _flags
 from linkwise.bench.engines.table import BY_NAME
 from linkwise.bench.pits import CPP, FULL, PYTHON, Box, Pits
@@ -61,6 +61,27 @@ def test_time_at_an_error_is_straight_in_logarithms():
 def test_points_that_another_one_beats_do_not_count():
     line = points((1e-4, 1.0), (1e-3, 5.0), (1e-8, 100.0), (1e-7, 300.0))
     assert time_at(line, 1e-6) == pytest.approx(10)
+
+
+def test_what_fails_is_not_asked_for_more_accuracy():
+    box, other = object(), object()
+    points = [
+        Point(Row("simulation", "arm", 7, "x", PYTHON, method), b, method, setting)
+        for b, method, setting in [
+            (box, "m", 1e-4),
+            (box, "m", 1e-6),
+            (box, "n", 1e-8),
+            (other, "m", 1e-8),
+            (box, "m", 1e-8),
+            (box, "m", 1e-10),
+        ]
+    ]
+    points[1].row.failure = "takes more than 20 s"
+    points[4].seconds.append(1.0)
+    give_up(points[1], points)
+    found = [point.row.failure for point in points]
+    assert found[5] == "not tried, for 1e-06 takes more than 20 s"
+    assert found[0] == found[2] == found[3] == found[4] == ""
 
 
 def test_memory_is_forecast_from_the_two_largest_sizes():

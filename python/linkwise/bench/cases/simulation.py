@@ -20,6 +20,8 @@ QUICK_TOLERANCES = (1e-7, 1e-9, 1e-11, 1e-13)
 STEPS = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)
 QUICK_STEPS = (5e-3, 2e-3, 5e-4)
 REPEATS, QUICK_REPEATS = 5, 2
+#: Seconds that one simulation may take, and after which it is not repeated.
+SLOWEST, LONG = 20.0, 2.0
 #: The reference is the work of none of ours: Pinocchio's accelerations, integrated by SciPy.
 REFERENCE = ("pinocchio", "SciPy DOP853", 3e-14)
 #: First-order methods need a step that no time budget allows for the errors of interest.
@@ -56,7 +58,10 @@ def _compare(pits: Pits, machine: Machine, duration: float) -> list[Row]:
         repeats = QUICK_REPEATS if pits.effort.quick else REPEATS
         for _ in range(repeats):
             for point in points:
-                _once(pits, point, duration, expected, folder)
+                if sum(point.seconds) < LONG:
+                    _once(pits, point, duration, expected, folder)
+                if point.row.failure:
+                    give_up(point, points)
     for point in points:
         _settle(point, duration)
     return rows
@@ -119,8 +124,17 @@ def _ask(
         repr(duration),
         repr(setting),
         str(folder / "q"),
-        timeout=4 * pits.effort.slowest,
+        timeout=min(4 * pits.effort.slowest, SLOWEST),
     )
+
+
+def give_up(failed: Point, points: Sequence[Point]) -> None:
+    """What takes too long or fails is not asked for more accuracy: points go from coarse to fine."""
+    same = [p for p in points if p.box is failed.box and p.method == failed.method]
+    later = same[next(k for k, p in enumerate(same) if p is failed) + 1 :]
+    for point in later:
+        if not point.seconds and not point.row.failure:
+            point.row.failure = f"not tried, for {failed.setting:g} {failed.row.failure}"
 
 
 def _once(pits: Pits, point: Point, duration: float, expected: Array | None, folder: Path) -> None:
