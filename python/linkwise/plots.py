@@ -38,7 +38,8 @@ class RunPlots:
         """Force and moment of a joint over time, by component (joint frame, joint point)."""
         from linkwise.loads.samples import joint_position
 
-        load = self._run.dataset["joint_load"].isel(joint=joint_position(self._run, joint))
+        where = joint_position(self._run, joint)
+        load = self._run.dataset["joint_load"].isel(joint=where)
         figure, axes = _figure(2)
         times = self._run.dataset["time"].values
         for axis, (half, unit, components) in zip(axes, _HALVES, strict=True):

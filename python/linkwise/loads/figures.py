@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from linkwise.result import Run
 
 Figure = dict[str, Any]
+TIMES = "times"
+"""Stands for the times of the samples drawn, which the page holds once."""
 _HALVES = (("force", "N", ("fx", "fy", "fz")), ("moment", "N m", ("nx", "ny", "nz")))
 
 
@@ -41,7 +43,7 @@ def _layout(title: str, x: str, y: str, **more: Any) -> Figure:
         "xaxis": {"title": {"text": x}},
         "yaxis": {"title": {"text": y}},
         "margin": {"l": 60, "r": 10, "t": 40, "b": 45},
-        "legend": {"orientation": "h", "y": -0.22},
+        "legend": {"orientation": "h", "y": -0.27},
         "hovermode": "x unified",
         **more,
     }
@@ -59,18 +61,18 @@ def _line(name: str, x: Any, y: npt.ArrayLike, **more: Any) -> Figure:
     } | more
 
 
-def _histories(times: Any, load: Array) -> list[Figure]:
+def _histories(load: Array) -> list[Figure]:
     made = []
     for k, (half, unit, components) in enumerate(_HALVES):
         part = load[:, 3 * k : 3 * k + 3]
-        data = [_line(name, times, part[:, c]) for c, name in enumerate(components)]
-        data.append(_line("size", times, np.linalg.norm(part, axis=1), line={"color": "black"}))
+        data = [_line(name, TIMES, part[:, c]) for c, name in enumerate(components)]
+        data.append(_line("size", TIMES, np.linalg.norm(part, axis=1), line={"color": "black"}))
         layout = _layout(half.capitalize(), "time [s]", f"{half} [{unit}]")
         made.append({"data": data, "layout": layout})
     return made
 
 
-def _areas(times: Any, shares: Array, causes: list[str]) -> list[Figure]:
+def _areas(shares: Array, causes: list[str]) -> list[Figure]:
     """Stacked areas: what adds to the size above zero, what relieves below."""
     colours = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
     made = []
@@ -86,8 +88,8 @@ def _areas(times: Any, shares: Array, causes: list[str]) -> list[Figure]:
                     "legendgroup": cause,
                     "showlegend": sign > 0,
                 }
-                data.append(_line(cause, times, values, **style))
-        data.append(_line("total", times, total, line={"color": "black"}))
+                data.append(_line(cause, TIMES, values, **style))
+        data.append(_line("total", TIMES, total, line={"color": "black"}))
         layout = _layout(f"{half.capitalize()} by cause", "time [s]", f"{half} [{unit}]")
         made.append({"data": data, "layout": layout})
     return made
@@ -121,14 +123,17 @@ def _polar(load: Array, direction: Array) -> Figure:
     }
 
 
-def _spectra(run: Run, joint: str) -> Figure:
+def _spectra(run: Run, joint: str, half: int) -> Figure:
     data = []
-    for component in ("fx", "fy", "fz"):
+    kind, unit, components = _HALVES[half]
+    for component in components:
         found = spectrum(run, joint, component)
         frequency = found["frequency"].values[1:]
         data.append(_line(component, packed(frequency), np.maximum(found.values[1:], 1e-30)))
-    layout = _layout("Spectral density of the force", "frequency [Hz]", "N²/Hz")
+    density = "N²/Hz" if unit == "N" else "N² m²/Hz"
+    layout = _layout(f"Spectral density of the {kind}", "frequency [Hz]", density)
     layout["xaxis"]["type"] = layout["yaxis"]["type"] = "log"
+    layout["yaxis"]["exponentformat"] = "power"
     return {"data": data, "layout": layout}
 
 
@@ -152,19 +157,20 @@ def joint_figures(
     directions = joint_directions(machine)[found.joints]
     where = [joint_names(run).index(joint) for joint in joints]
     load = rows(run, "joint_load", slice(None))[::every][:, where]
-    times = packed(run.dataset["time"].values[::every])
     shares, causes = _thinned_shares(run, machine, every, where)
     made: dict[str, list[Figure]] = {}
     for j, joint in enumerate(joints):
-        figures = _histories(times, load[:, j])
+        figures = _histories(load[:, j])
         if shares is not None:
-            figures += _areas(times, shares[:, :, j], causes)
+            figures += _areas(shares[:, :, j], causes)
         own, direction = load[:, j], directions[where[j]]
         optional: tuple[tuple[Callable[..., Figure], tuple[Any, ...]], ...] = (
-            (_engineering, (times, own, direction)),
+            (_engineering, (own, direction, 0)),
+            (_engineering, (own, direction, 1)),
             (_polar, (own, direction)),
-            (_spectra, (run, joint)),
             (_duration, (run, joint, machine)),
+            (_spectra, (run, joint, 0)),
+            (_spectra, (run, joint, 1)),
         )
         for make, arguments in optional:
             # An InputError says that this joint or run has no such figure.
@@ -174,17 +180,16 @@ def joint_figures(
     return made
 
 
-def _engineering(times: Any, load: Array, direction: Array) -> Figure:
+def _engineering(load: Array, direction: Array, half: int) -> Figure:
+    """Parts along and across the axis: apart, so that neither scale hides the other."""
     if np.isnan(direction).any():
         raise InputError("no axis")
     found = derive(load[:, None], direction[None])
-    data = [_line(name.replace("_", " "), times, found[name][:, 0]) for name in ("axial", "radial")]
-    for name in ("torque", "tilting_moment"):
-        data.append(_line(name.replace("_", " "), times, found[name][:, 0], yaxis="y2"))
-    layout = _layout("Along and across the axis", "time [s]", "force [N]")
-    layout["yaxis2"] = {"title": {"text": "moment [N m]"}, "overlaying": "y", "side": "right"}
-    layout["margin"]["r"] = 60
-    return {"data": data, "layout": layout}
+    names = (("axial", "radial"), ("torque", "tilting_moment"))[half]
+    data = [_line(name.replace("_", " "), TIMES, found[name][:, 0]) for name in names]
+    title = ("Force along and across the axis", "Moment about and across the axis")[half]
+    kind, unit, _ = _HALVES[half]
+    return {"data": data, "layout": _layout(title, "time [s]", f"{kind} [{unit}]")}
 
 
 def _thinned_shares(
@@ -209,13 +214,12 @@ def energy_figure(run: Run, every: int, model: Model | None) -> list[Figure]:
         balance = energy_balance(run, model)
     except InputError:
         return []
-    times = packed(balance["time"].values[::every])
     lines = {
-        str(name): _line(values.attrs["long_name"], times, values.values[::every])
+        str(name): _line(values.attrs["long_name"], TIMES, values.values[::every])
         for name, values in balance.data_vars.items()
     }
     residual = lines.pop("residual")
-    step = [] if "step_size" not in run.dataset else [_steps(run, times, every)]
+    step = [] if "step_size" not in run.dataset else [_steps(run, every)]
     return [
         {"data": list(lines.values()), "layout": _layout("Energy", "time [s]", "energy [J]")},
         {"data": [residual], "layout": _layout("What does not add up", "time [s]", "energy [J]")},
@@ -223,9 +227,9 @@ def energy_figure(run: Run, every: int, model: Model | None) -> list[Figure]:
     ]
 
 
-def _steps(run: Run, times: Any, every: int) -> Figure:
+def _steps(run: Run, every: int) -> Figure:
     layout = _layout("Integration step", "time [s]", "step [s]")
     layout["yaxis"]["type"] = "log"
     steps = run.dataset["step_size"].values[::every]
-    line = _line("step", times, np.where(steps > 0, steps, np.nan))  # none before the first
+    line = _line("step", TIMES, np.where(steps > 0, steps, np.nan))  # none before the first
     return {"data": [line], "layout": layout}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
-from linkwise.loads.figures import energy_figure, joint_figures
+from linkwise.loads.figures import energy_figure, joint_figures, packed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,8 @@ h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2rem }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; width: 100% }
 td { white-space: nowrap }
 th, td { padding: .2rem .6rem; text-align: right; border-bottom: 1px solid #ddd }
-th:first-child, td:first-child { text-align: left }
+th:first-child, td:first-child, .facts td, .named td:nth-child(2), .named th:nth-child(2) {
+  text-align: left } .facts { width: auto } td small { display: block; color: #555 }
 tr.over td { color: #b00020; font-weight: 600 }
 pre { background: #f5f5f5; padding: 1rem; overflow-x: auto } .scroll { overflow-x: auto }
 .grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(480px, 1fr)); gap: 1rem }
@@ -40,6 +41,10 @@ pre { background: #f5f5f5; padding: 1rem; overflow-x: auto } .scroll { overflow-
 _SCRIPT = """
 const figures = JSON.parse(document.getElementById("figures").textContent);
 const options = {responsive: true, displaylogo: false};
+// Curves over time say so instead of each holding the times.
+for (const figure of [...Object.values(figures.joints).flat(), ...figures.energy]) {
+  for (const trace of figure.data) if (trace.x === "times") trace.x = figures.times;
+}
 function draw(place, list) {
   place.querySelectorAll(".figure").forEach(old => Plotly.purge(old));
   place.replaceChildren();
@@ -67,33 +72,43 @@ def _row(cells: list[str], tag: str = "td", style: str = "") -> str:
     return f'<tr class="{style}">{inner}</tr>' if style else f"<tr>{inner}</tr>"
 
 
-def _table(headings: list[str], rows: list[str]) -> str:
-    head = _row([escape(h) for h in headings], "th")
-    return f'<div class="scroll"><table>{head}{"".join(rows)}</table></div>'
+def _table(headings: list[str], rows: list[str], style: str = "") -> str:
+    head = _row([escape(h) for h in headings], "th") if headings else ""
+    return f'<div class="scroll"><table class="{style}">{head}{"".join(rows)}</table></div>'
+
+
+def _peak(value: float, bound: float) -> str:
+    shown = _number(value)
+    return f"{shown} ± {_number(bound, 1)}" if shown and np.isfinite(bound) else shown
 
 
 def _peak_table(summary: xr.Dataset, limits: xr.Dataset | None) -> str:
     names = [str(q) for q in summary["quantity"].values]
     units = [str(u) for u in summary["quantity_units"].values]
     peak, when = summary["peak"].values, summary["peak_time"].values
-    bound = None if limits is None else limits["plus_minus"].values
-    headings = ["joint"]
-    for name, unit in zip(names, units, strict=True):
-        headings += [f"{name.replace('_', ' ')} [{unit}]", "at [s]"]
+    bound = _bounds(summary, limits)
+    pairs = zip(names, units, strict=True)
+    headings = ["joint", *(f"{name.replace('_', ' ')} [{unit}]" for name, unit in pairs)]
     rows = []
     for j, joint in enumerate(summary["joint"].values):
         cells = [escape(str(joint))]
         for k in range(len(names)):
-            shown = _number(peak[k, j])
-            if shown and bound is not None and np.isfinite(bound[k, j]):
-                shown += f" ± {_number(bound[k, j], 1)}"
-            cells += [shown, _number(when[k, j])]
+            shown = _peak(peak[k, j], bound[k, j])
+            cells.append(f"{shown}<small>at {_number(when[k, j])} s</small>" if shown else "")
         rows.append(_row(cells))
     return _table(headings, rows)
 
 
-def _margin_table(summary: xr.Dataset, left: xr.Dataset) -> str:
+def _bounds(summary: xr.Dataset, limits: xr.Dataset | None) -> Any:
+    """The plus-minus (quantity, joint) of the peaks, NaN where it is not known."""
+    if limits is None:
+        return np.full(summary["peak"].shape, np.nan)
+    return limits["plus_minus"].values
+
+
+def _margin_table(summary: xr.Dataset, left: xr.Dataset, limits: xr.Dataset | None) -> str:
     rows = []
+    bound = _bounds(summary, limits)
     for k, quantity in enumerate(left["quantity"].values):
         for j, joint in enumerate(left["joint"].values):
             rating, use = float(left["rating"][k, j]), float(left["use"][k, j])
@@ -102,14 +117,14 @@ def _margin_table(summary: xr.Dataset, left: xr.Dataset) -> str:
             cells = [
                 escape(str(joint)),
                 f"{quantity} [{summary['quantity_units'].values[k]}]".replace("_", " "),
-                _number(float(summary["peak"][k, j])),
+                _peak(float(summary["peak"][k, j]), bound[k, j]),
                 _number(rating),
                 f"{100 * use:.1f} %",
                 f"{100 * float(left['margin'][k, j]):.1f} %",
             ]
             rows.append((use, _row(cells, style="over" if use > 1 else "")))
     ordered = [row for _, row in sorted(rows, key=lambda item: -item[0])]
-    return _table(["joint", "quantity", "peak", "rating", "use", "margin"], ordered)
+    return _table(["joint", "quantity", "peak", "rating", "use", "margin"], ordered, "named")
 
 
 def _envelope_table(run: Run) -> str:
@@ -139,7 +154,7 @@ def _fatigue_table(run: Run, joints: list[str]) -> str:
     rows = [
         _row(
             [
-                escape(joint),
+                escape(joint) if k == 0 else "",
                 f"{float(m):g}",
                 *(_number(x) for x in found.values[k, j]),
             ]
@@ -173,7 +188,7 @@ def _health(run: Run, limits: xr.Dataset | None) -> str:
             else "not bounded; add --certify SCENARIO"
         )
         facts.append(("integration error", text))
-    return _table(["", ""], [_row([escape(a), escape(b)]) for a, b in facts])
+    return _table([], [_row([escape(a), escape(b)]) for a, b in facts], "facts")
 
 
 def _plotly() -> Any:
@@ -211,6 +226,7 @@ def write_report(
     drawn = [name for name in names if name in set(ranked)]
     every = max(1, -(-run.dataset.sizes["time"] // MOST_SAMPLES))
     content = {
+        "times": packed(run.dataset["time"].values[::every]),
         "joints": joint_figures(run, drawn, every, model),
         "energy": energy_figure(run, every, model),
     }
@@ -231,7 +247,9 @@ def write_report(
         "frame fixed in the outboard body, moments about the joint point. SI units. ± is the "
         "bound of algebraic and integration error.</p>",
         f"<h2>Peaks</h2>{_peak_table(summary, limits)}",
-        f"<h2>Against the ratings</h2>{_margin_table(summary, left)}" if left is not None else "",
+        f"<h2>Against the ratings</h2>{_margin_table(summary, left, limits)}"
+        if left is not None
+        else "",
         f"<h2>Envelopes</h2>{_envelope_table(run)}",
         f"<h2>Damage-equivalent ranges{fewer}</h2><p class='note'>Peak to peak, one cycle a second "
         f"of the run.</p>{_fatigue_table(run, drawn)}",

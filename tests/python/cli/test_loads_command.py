@@ -98,6 +98,15 @@ def test_report(linkwise, run):
         assert title in ours
 
 
+def test_report_of_ten_joints_and_ten_seconds_is_small(tmp_path):
+    pytest.importorskip("plotly")
+    from linkwise.loads.html import write_report
+
+    run = lw.simulate(lw.scenes.chain(10, damping=2.0), duration=10, every=0.01, q0=[0.4] * 10)
+    path = write_report(run, tmp_path / "ten.html", {"summary": lw.loads.summary(run)})
+    assert 5e6 < path.stat().st_size < 8e6
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
@@ -116,6 +125,42 @@ def test_wrong_input(linkwise, run, tmp_path, arguments, complaint):
     result = linkwise("loads", *arguments)
     assert result.code == 2
     assert complaint in result.complaint
+
+
+@pytest.mark.parametrize(
+    ("position", "complaint"),
+    [
+        (
+            lambda t: np.where(t < 0.2, 0.0, 0.1),
+            r"the position jumps by about 0\.1\d* near t = 0\.\d+ s",
+        ),
+        (lambda t: np.abs(t - 0.2), r"the velocity jumps by about 2 near t = 0\.2 s"),
+        (
+            lambda t: np.maximum(t - 0.2, 0) ** 2,
+            r"the acceleration jumps by about 2 near t = 0\.2 s",
+        ),
+        (lambda t: 4 * t**3 + 1.2, r"leaves the joint's limits -1\.5 \.\. 1\.5 at t = 0\.\d+ s"),
+        (lambda t: np.where(t < 0.4, t, np.nan), "elbow.csv"),
+    ],
+    ids=["position", "velocity", "acceleration", "limits", "nan"],
+)
+def test_motion_tables_that_cannot_be_followed(linkwise, scene, tmp_path, position, complaint):
+    times = np.linspace(0, 0.5, 201)
+    rows = [f"{t:.12g},{q:.15g}" for t, q in zip(times, position(times), strict=True)]
+    (tmp_path / "elbow.csv").write_text("time,elbow\n" + "\n".join(rows) + "\n")
+    result = linkwise("run", scene, "-o", "run.zarr")
+    assert result.code == 2
+    assert re.search(complaint, result.complaint), result.complaint
+    assert "elbow" in result.complaint
+    assert not (tmp_path / "run.zarr").exists()
+
+
+def test_a_run_without_loads_says_what_to_record(linkwise, scene):
+    scene.write_text(scene.read_text().replace("[output]", '[output]\nquantities = ["position"]'))
+    assert linkwise("run", scene, "-o", "run.zarr").code == 0
+    result = linkwise("loads", "run.zarr")
+    assert result.code == 2
+    assert 'record the quantity "joint_load"' in result.complaint
 
 
 def test_sweep(linkwise, scene):

@@ -8,18 +8,11 @@ from dataclasses import dataclass
 import pytest
 
 import linkwise as lw
+from helpers.browser import CHROMIUM_ARGUMENTS, CHROMIUMS, PATIENCE, WINDOW
 from linkwise import cli
 
 START = (0.0, -0.3, 0.5, -0.2, 0.15, 0.0)
 DURATION = 2.0
-CHROMIUMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-# Drawn by the processor: the machines that run tests have no display and no GPU.
-CHROMIUM_ARGUMENTS = [
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-]
 
 
 @pytest.fixture(scope="session")
@@ -113,3 +106,20 @@ def chromium():
         browser = driver.chromium.launch(executable_path=executable, args=CHROMIUM_ARGUMENTS)
         yield browser
         browser.close()
+
+
+@pytest.fixture
+def page(chromium):
+    """A page whose errors fail the test."""
+    context = chromium.new_context(viewport=WINDOW)
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE * 1000)
+    wrong = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("requestfailed", lambda request: wrong.append(request.url))
+    page.on(
+        "console", lambda message: wrong.append(message.text) if message.type == "error" else None
+    )
+    yield page
+    context.close()
+    assert wrong == []

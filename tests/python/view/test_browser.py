@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
+from helpers.browser import PATIENCE, WINDOW
 from linkwise.view.export import write_html
 from linkwise.view.scene import Scene
 from linkwise.view.server import running
@@ -20,27 +21,8 @@ pytest.importorskip("viser", reason="the view needs viser: pip install '.[view]'
 imageio = pytest.importorskip("imageio.v3")
 
 pytestmark = pytest.mark.browser
-PATIENCE = 180  # seconds
-WINDOW = {"width": 900, "height": 560}
 SCENE = {"x": 0, "y": 190, "width": 490, "height": 300}  # beside the panel, below messages
-MACHINE_TONE = 0.80  # of white: the grid is lighter, what belongs to the machine darker
-
-
-@pytest.fixture
-def page(chromium):
-    """A page whose errors fail the test."""
-    context = chromium.new_context(viewport=WINDOW)
-    page = context.new_page()
-    page.set_default_timeout(PATIENCE * 1000)
-    wrong = []
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("requestfailed", lambda request: wrong.append(request.url))
-    page.on(
-        "console", lambda message: wrong.append(message.text) if message.type == "error" else None
-    )
-    yield page
-    context.close()
-    assert wrong == []
+MACHINE_TONE = 0.74  # of white: the grid is lighter, what belongs to the machine darker
 
 
 def open_page(page, address):
@@ -147,10 +129,11 @@ def test_run_is_drawn_plays_and_scrubs(serve, run_path, page):
 
     page.get_by_role("button", name="Play").click()
     wait_for_time(page, lambda now: now > 0.3)
+    wait_for(page, lambda image: changed(image, start) > 200, "moved")
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Play").wait_for()
     stopped = readout(page)
-    wait_for(page, lambda image: changed(image, start) > 200, "moved")
+    still(page)
     assert readout(page) == stopped  # paused
 
     page.get_by_role("slider").first.press("End")

@@ -1,0 +1,12 @@
+"""The headless Chromium of the browser tests."""
+
+PATIENCE = 180  # seconds
+WINDOW = {"width": 900, "height": 560}
+CHROMIUMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# Drawn by the processor: the machines that run tests have no display and no GPU.
+CHROMIUM_ARGUMENTS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+]

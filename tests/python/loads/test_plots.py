@@ -1,0 +1,73 @@
+"""Figures from Python: they hold the run's numbers."""
+
+import numpy as np
+import pytest
+
+import linkwise as lw
+from helpers.machines import pendulum
+
+pytest.importorskip("matplotlib", reason="plots need matplotlib: pip install '.[plot]'")
+
+
+def curves(axis):
+    return {line.get_label(): line.get_xydata().T for line in axis.get_lines()}
+
+
+def test_loads_of_a_joint(swing):
+    force, moment = swing.plot.loads("elbow").axes
+    for axis, names in ((force, ("fx", "fy", "fz")), (moment, ("nx", "ny", "nz"))):
+        drawn = curves(axis)
+        for name in names:
+            load = swing.joint_load.sel(joint="elbow", component=name)
+            np.testing.assert_array_equal(drawn[name], [swing.time, load])
+    assert force.get_ylabel() == "force [N]"
+    assert moment.get_ylabel() == "moment [N m]"
+
+
+@pytest.mark.parametrize("by", ["force", "motion"])
+def test_split_stacks_up_to_the_total(swing, by):
+    shares = lw.loads.split(swing, by).sel(joint="elbow")
+    figure = swing.plot.split("elbow", by)
+    for axis, half in zip(figure.axes, (slice(0, 3), slice(3, 6)), strict=True):
+        size = np.linalg.norm(swing.joint_load.sel(joint="elbow").values[:, half], axis=1)
+        np.testing.assert_allclose(curves(axis)["total"][1], size, rtol=1e-12)
+        areas = [area.get_label() for area in axis.collections[: shares.sizes["cause"]]]
+        assert areas == shares.cause.values.tolist()
+        # What is stacked above zero less what is stacked below is the size.
+        tops = [np.abs(area.get_paths()[0].vertices[:, 1]).max() for area in axis.collections]
+        assert max(tops) >= size.max() * (1 - 1e-12)
+
+
+def test_energy(swing):
+    balance = lw.loads.energy_balance(swing)
+    above, below = (curves(axis) for axis in swing.plot.energy().axes)
+    assert len(above) == 5
+    for name in ("kinetic_energy", "drive_work", "dissipated"):
+        drawn = above[balance[name].attrs["long_name"]]
+        np.testing.assert_array_equal(drawn, [balance.time, balance[name]])
+    np.testing.assert_array_equal(below["energy that does not add up"][1], balance.residual)
+
+
+def test_figures_are_files(swing, tmp_path):
+    for name, figure in (("a.png", swing.plot.loads("wrist")), ("b.svg", swing.plot.energy())):
+        figure.savefig(tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("draw", "quantity"),
+    [
+        (lambda run: run.plot.loads("pivot"), "joint_load"),
+        (lambda run: run.plot.split("pivot"), "joint_load"),
+        (lambda run: run.plot.energy(), "joint_load"),
+    ],
+)
+def test_a_run_that_lacks_the_quantity_says_so(draw, quantity):
+    run = lw.simulate(pendulum(), duration=0.1, every=0.05, quantities=["position"])
+    with pytest.raises(lw.InputError, match=f'record the quantity "{quantity}"'):
+        draw(run)
+
+
+def test_unknown_joints_are_named(swing):
+    with pytest.raises(lw.InputError, match="did you mean 'elbow'"):
+        swing.plot.loads("elbw")
