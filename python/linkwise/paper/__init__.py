@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from linkwise import _core
-from linkwise.paper import chains, guesses, spectra, state_choice, table2
+from linkwise.paper import chains, guesses, other_codes, spectra, spread, state_choice, table2
 from linkwise.paper.claims import judge_all
 from linkwise.paper.published import INTEGRATOR_TOLERANCE, TOLERANCE_RATIO
 from linkwise.paper.report import render
+from linkwise.paper.tables import tables
 from linkwise.record.provenance import versions
 
 __all__ = ["Step", "reproduce", "write_report"]
@@ -60,7 +61,8 @@ def reproduce(
     `quick` keeps chains short and times rough: under a minute instead of some minutes.
     """
     started = clock.perf_counter()
-    advance = _Counter(table2.count() + chains.count(quick) + guesses.count() + 2, progress)
+    counts = (table2.count(), spread.count(), chains.count(quick), guesses.count(), 3)
+    advance = _Counter(sum(counts), progress)
     results: dict[str, Any] = {
         "quick": quick,
         "seed": seed,
@@ -70,6 +72,8 @@ def reproduce(
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         },
         "table2": table2.table2(advance),
+        "spread": spread.spread(advance),
+        "other_codes": other_codes.other_codes(advance),
         "fig2": (fig2 := chains.fig2(quick, seed, advance)),
         "fig3": chains.fig3(fig2, seed, advance),
         "warm_start": guesses.warm_start(advance),
@@ -93,7 +97,7 @@ def write_report(
     seed: int = 0,
     progress: Callable[[Step], object] | None = None,
 ) -> dict[str, Any]:
-    """Compute everything, write index.html and results.json to `directory`, return the results."""
+    """Compute everything and write index.html, tables.md and results.json to `directory`."""
     folder = Path(directory)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -104,5 +108,6 @@ def write_report(
     results = reproduce(quick=quick, seed=seed, progress=progress)
     text = json.dumps(results, indent=1, allow_nan=False)
     (folder / "results.json").write_text(text + "\n", encoding="utf-8")
+    (folder / "tables.md").write_text(tables(results), encoding="utf-8")
     (folder / "index.html").write_text(render(results), encoding="utf-8")
     return results

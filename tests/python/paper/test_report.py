@@ -36,7 +36,11 @@ class Checker(HTMLParser):
 
 def test_the_page_is_complete_and_self_contained(report, results):
     folder, _ = report
-    assert sorted(path.name for path in folder.iterdir()) == ["index.html", "results.json"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "index.html",
+        "results.json",
+        "tables.md",
+    ]
     text = (folder / "index.html").read_text(encoding="utf-8")
     checker = Checker()
     checker.feed(text)
@@ -46,6 +50,21 @@ def test_the_page_is_complete_and_self_contained(report, results):
     assert "script" not in checker.tags
     assert not re.search(r"\bnan\b|\binf\b|None", text)
     assert text.count("<svg") == 3 * len(results["fig2"])
+
+
+def test_the_tables_are_markdown_of_the_same_numbers(report, results):
+    folder, _ = report
+    text = (folder / "tables.md").read_text(encoding="utf-8")
+    for line in text.splitlines():
+        if line.startswith("| `") and " II " not in line:
+            assert line.endswith(" |")
+    for row in results["table2"]:
+        assert f"`{row['method']}`" in text
+    for claim in results["claims"]:
+        assert claim["claim"] in text
+    assert not re.search(r"\bnan\b|\binf\b|None", text)
+    widths = [line.count(" | ") for line in text.splitlines() if line.startswith("| ")]
+    assert min(widths) >= 2
 
 
 def test_every_claim_has_a_verdict_and_a_figure(results):

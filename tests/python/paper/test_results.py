@@ -27,15 +27,26 @@ def test_every_method_is_in_table_2_for_both_maneuvers(table2):
 
 @pytest.mark.parametrize("maneuver", MANEUVERS)
 @pytest.mark.parametrize("solver", FIVE)
-def test_mean_iterations_are_those_of_the_stand_in_elsewhere(table2, solver, maneuver):
+def test_mean_iterations_are_those_of_the_stand_in_elsewhere(table2, results, solver, maneuver):
     known = published.STAND_IN_MEAN_ITERATIONS[solver][MANEUVERS.index(maneuver)]
     found = table2[solver, maneuver, "paper"]["mean_iterations"]
+    (near,) = (r for r in results["spread"] if (r["method"], r["maneuver"]) == (solver, maneuver))
+    assert near["least_mean_iterations"] <= found <= near["most_mean_iterations"]
     if (solver, maneuver) == ("gauss_seidel", "II"):
-        # Where nearly every iteration is spent after changes of the step, codes for Adams' method
-        # differ most: VODE's steps give 251, ours must lie between it and the stand-in's 367.
-        assert 251 < found < known
+        # What its stop test leaves steers the steps most: at some tolerances within 5 % of TOL it
+        # takes as many iterations, at TOL itself not quite.
+        assert near["most_mean_iterations"] == pytest.approx(known, rel=0.15)
+        assert found == pytest.approx(known, rel=0.2)
     else:
         assert found == pytest.approx(known, rel=0.15)
+
+
+def test_other_codes_for_adams_method_count_alike(table2, results):
+    for row in results["other_codes"]:
+        if row["code"] == "vode":
+            ours = table2[row["method"], row["maneuver"], "paper"]
+            assert row["mean_iterations"] == pytest.approx(ours["mean_iterations"], rel=0.2)
+            assert row["mean_iterations"] <= ours["mean_iterations"]  # from the last calls
 
 
 def test_conjugate_gradients_need_the_fewest_iterations_of_the_five(table2):
@@ -45,11 +56,15 @@ def test_conjugate_gradients_need_the_fewest_iterations_of_the_five(table2):
 
 
 @pytest.mark.parametrize("maneuver", MANEUVERS)
-def test_our_protocol_takes_at_most_five_iterations_and_ends_as_near(table2, maneuver):
-    ours = table2["conjugate_gradient", maneuver, "ours"]
-    assert ours["mean_iterations"] <= 5
+def test_five_iterations_are_enough_for_the_accuracy_of_the_direct_solution(table2, maneuver):
     direct = table2["thomas", maneuver, "paper"]
-    assert ours["final_error"] <= 1.05 * direct["final_error"]
+    for protocol, nearness in (("ours", 2.0), ("tight", 1.25)):
+        row = table2["conjugate_gradient", maneuver, protocol]
+        assert row["mean_iterations"] <= 5
+        assert row["weighted_final_error"] <= nearness * direct["weighted_final_error"]
+    papers = table2["conjugate_gradient", maneuver, "paper"]
+    ours = table2["conjugate_gradient", maneuver, "ours"]
+    assert ours["final_error"] <= 1.01 * papers["final_error"]
 
 
 @pytest.mark.parametrize("maneuver", MANEUVERS)
