@@ -79,17 +79,21 @@ def contestants() -> Iterator[Contestant]:
 
 
 def free_motion(model: Model, states: int, seed: int) -> Motion:
-    """The model let go at rest in a random pose within its limits (seeded)."""
+    """The model let go in a random pose within its limits, at random rates (seeded).
+
+    At rest a floating machine would fall without any force in its joints.
+    """
     simulation = _core.Simulation(model, method=REFERENCE)
-    q0 = random_pose(model, np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
+    q0 = random_pose(model, rng)
     return _record(
         simulation,
         model,
         q0,
-        np.zeros(model.nv),
+        rng.uniform(-0.3, 0.3, model.nv),
         _FREE_DURATION,
         states,
-        "let go at rest",
+        "let go at random rates",
         # Past the short steps of the start.
         most_steps=lambda wanted: 2 * wanted + 50,
     )

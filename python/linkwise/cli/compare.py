@@ -47,8 +47,8 @@ def compare(
 ) -> None:
     """Run every method, solver and initial guess on MODEL or SCENARIO and compare them.
 
-    A model is let go at rest in a random pose; a scenario is followed to its middle. Iterative
-    solvers start from the solutions of the steps before.
+    A model is let go in a random pose at random rates; a scenario is followed to its middle.
+    Iterative solvers start from the solutions of the steps before.
     """
     from linkwise.compare import compare as run_comparison
     from linkwise.compare import plot as draw
@@ -133,4 +133,7 @@ def _show(found: dict[str, Any]) -> None:
 
 
 def _cell(value: float | None, digits: int, scale: float = 1.0) -> str:
-    return "" if value is None else number(scale * value, digits)
+    if value is None:
+        return ""
+    shown = scale * value
+    return f"{shown:.0f}" if 10**digits <= abs(shown) < 1e7 else number(shown, digits)

@@ -90,6 +90,22 @@ def reproduce(
     return plain
 
 
+def _as_text(results: dict[str, Any]) -> str:
+    """JSON with one row of a table a line: small, and still good for diffs."""
+
+    def dump(value: Any) -> str:
+        return json.dumps(value, allow_nan=False)
+
+    parts = []
+    for key, value in results.items():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            text = "[\n" + ",\n".join("  " + dump(row) for row in value) + "\n ]"
+        else:
+            text = dump(value)
+        parts.append(f" {dump(key)}: {text}")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
 def write_report(
     directory: str | os.PathLike[str],
     *,
@@ -106,8 +122,7 @@ def write_report(
             f"{folder}: cannot be made a folder ({error.strerror}); name another"
         ) from None
     results = reproduce(quick=quick, seed=seed, progress=progress)
-    text = json.dumps(results, indent=1, allow_nan=False)
-    (folder / "results.json").write_text(text + "\n", encoding="utf-8")
+    (folder / "results.json").write_text(_as_text(results), encoding="utf-8")
     (folder / "tables.md").write_text(tables(results), encoding="utf-8")
     (folder / "index.html").write_text(render(results), encoding="utf-8")
     return results
