@@ -74,11 +74,12 @@ def test_ten_thousand_links_take_one_message_a_group():
         for name in scene.toggles:
             scene.toggle(name, True)
         scene.set_largest(1e5, 1.0)
-        q = np.full(model.nq, 1e-4)
         sent = []
         server._websock_server.queue_message = sent.append
-        loads, spent = static_loads(model, q), []
-        for _ in range(5):
+        spent = []
+        for picture in range(1, 6):
+            q = np.full(model.nq, picture * 1e-4)
+            loads = static_loads(model, q)
             sent.clear()
             before = time.process_time()
             scene.show(scene.at(q, loads))
