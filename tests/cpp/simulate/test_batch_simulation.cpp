@@ -21,7 +21,7 @@ struct Members {
   std::vector<double> q, v, tau;
   std::vector<double> position, velocity, acceleration, load, torque, kinetic, potential;
 
-  Members(const Model& m, size_t count, size_t times) : count(count), times(times) {
+  Members(const Model& m, size_t members, size_t instants) : count(members), times(instants) {
     Draws draws(17);
     for (size_t i = 0; i < count; ++i) {
       const MachineState state = random_state(m, draws);
