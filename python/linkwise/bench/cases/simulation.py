@@ -129,7 +129,7 @@ def _ask(
 
 
 def give_up(failed: Point, points: Sequence[Point]) -> None:
-    """What takes too long or fails is not asked for more: points go from coarse to fine."""
+    """What takes too long or fails is not asked for more: points go coarse to fine."""
     same = [p for p in points if p.box is failed.box and p.method == failed.method]
     later = same[next(k for k, p in enumerate(same) if p is failed) + 1 :]
     for point in later:
