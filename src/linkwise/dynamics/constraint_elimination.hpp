@@ -94,7 +94,6 @@ class ConstraintElimination {
     Force<S> known;  ///< the drives' wrench
     Compliance<S> Phi;
     JointConstraint<S> joint;
-    int n_columns;
     Motion<S> P[6];
   };
 
@@ -158,7 +157,6 @@ class ConstraintElimination {
     const BodyTopology& body = model_->topology[n];
     SlowJoint& slow = slow_[slow_of_[n]];
     const Motion<double> axis = element_column<double>(model_->elements[body.first_element], 0);
-    slow.n_columns = 1;
     slow.P[0] = {axis.lin + Vec3<S>{}, axis.ang + Vec3<S>{}};
     calc_joint_constraint(slow.P, &body.v, 1, armature(), slow.joint);
   }
@@ -205,7 +203,6 @@ class ConstraintElimination {
       slow.X = state.X;
       slow.c = state.c;
       body_[n].v = state.v;
-      slow.n_columns = g.n;
       for (int i = 0; i < g.n; ++i) slow.P[i] = g.P[i];
       calc_joint_constraint(g.P, g.dof, g.n, armature(), slow.joint);
     } else {
