@@ -45,13 +45,8 @@ class BodyColumns {
 
   void update(const SweepInput<double>& in) {
     calc_body_states(*model_, in, state_.data(), general_.data());
-    for (int n = 0; n < model_->n_bodies(); ++n) read_columns(n);
-  }
-  /// Body n alone; its parent's state must be there. External wrenches are left out.
-  void update_body(const SweepInput<double>& in, int n) {
-    calc_run_states(*model_, {model_->topology[n].kind, n, n + 1}, in, state_.data(),
-                    general_.data());
-    read_columns(n);
+    for (int n = 0; n < model_->n_bodies(); ++n)
+      body_columns(*model_, n, general_, P_.data() + first_[n], dof_.data() + first_[n]);
   }
 
   int count() const { return count_; }
@@ -62,8 +57,6 @@ class BodyColumns {
   BodyState<double>& state(int n) { return state_[n]; }
 
  private:
-  void read_columns(int n) { body_columns(*model_, n, general_, &P_[first_[n]], &dof_[first_[n]]); }
-
   const Model* model_;
   std::vector<BodyState<double>> state_;
   std::vector<GeneralState<double>> general_;
