@@ -79,7 +79,9 @@ def markdown(rows: list[dict[str, Any]]) -> str:
         "steps, evaluations": lambda r: f"{r['steps']}, {r['evaluations']}",
         "model built in": lambda r: f"{r['build_seconds']:.2f} s",
         "simulated in": lambda r: f"{r['seconds']:.1f} s",
-        "ns a link and evaluation": lambda r: f"{r['ns_per_body']:.0f}",
+        "processor time, labels of the results included": lambda r: (
+            f"{r['processor_seconds']:.0f} s"
+        ),
         "peak memory": lambda r: f"{r['peak_bytes'] / 2**30:.2f} GiB",
         "bytes a link": lambda r: f"{r['peak_bytes_per_link']:.0f}",
         "tip fell": lambda r: f"{r['tip_fell']:.9g} m of {r['free_fall']:.9g} m",
