@@ -426,8 +426,10 @@ void bind_evaluator(nb::module_& m) {
           "__init__",
           [](PyEvaluator* self, const PyModel& model, const std::string& method,
              const std::string& solver, const std::string& guess, double tolerance,
-             const std::string& stop, int max_iterations, nb::handle solver_options) {
+             const std::string& stop, int max_iterations, nb::handle solver_options,
+             nb::handle threads) {
             DynamicsOptions options;
+            options.threads = threads_of(threads, 1 << 20);
             options.method = method;
             options.solver = solver;
             options.initial_guess = guess;
@@ -439,7 +441,7 @@ void bind_evaluator(nb::module_& m) {
           },
           "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto",
           "initial_guess"_a = "cubic", "tolerance"_a = 1e-7, "stop"_a = "energy_norm",
-          "max_iterations"_a = 0, "solver_options"_a = nb::none())
+          "max_iterations"_a = 0, "solver_options"_a = nb::none(), "threads"_a = nb::none())
       .def(
           "evaluate", &PyEvaluator::evaluate, "t"_a, "q"_a, "v"_a = nb::none(),
           "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(), "passive"_a = false,

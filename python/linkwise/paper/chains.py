@@ -103,6 +103,7 @@ def measure(
         stop=stop,
         tolerance=INTEGRATOR_TOLERANCE * TOLERANCE_RATIO,
         max_iterations=MOST_ITERATIONS,
+        threads=1,
     )
     seconds = np.full(STEPS, np.inf)
     started = clock.perf_counter()

@@ -123,6 +123,7 @@ constexpr int piecewise_from = 64;
 Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
   Choice choice{options.method, options.solver, "as asked for"};
   if (options.solver != "auto") find_solver(options.solver);
+  make_initial_guess(options.initial_guess, {options.history});  // refuses unknown names
   if (options.method == "auto") {
     if (options.solver != "auto") {
       choice.method = "constraint_force";

@@ -101,7 +101,8 @@ struct Report {
   int iterations = 0;
   /// Estimate of ||x* - x||_A / ||x*||_A; NaN when a direct solver was not asked for it.
   double error_estimate = 0.0;
-  /// The node at which a factorisation broke down, or -1.
+  /// The node at which a factorisation broke down, or of the largest residual where an iteration
+  /// ended without meeting its tolerance, or -1.
   int node = -1;
   bool ok() const { return outcome == Outcome::converged; }
 };

@@ -151,6 +151,8 @@ TEST(Outcomes, IterationLimit) {
         solve(name.data(), options, rod_chain({RodJoint::revolute_random, true, 40}));
     EXPECT_EQ(solved.report.outcome, Outcome::reached_max_iterations) << name;
     EXPECT_EQ(solved.report.iterations, 3) << name;
+    EXPECT_GE(solved.report.node, 0) << name;
+    EXPECT_LT(solved.report.node, 40) << name;
   }
 }
 

@@ -63,9 +63,28 @@ Report IterativeSolver::solve(const BlockTree& A, std::span<const double> b, std
     report.error_estimate = std::numeric_limits<double>::infinity();
   if (report.outcome == Outcome::not_positive_definite && !A.all_finite())
     report.outcome = Outcome::not_finite;
-  report.node = failed_node_;
+  const bool unfinished = report.outcome == Outcome::reached_max_iterations ||
+                          report.outcome == Outcome::stagnated ||
+                          report.outcome == Outcome::diverged;
+  report.node = unfinished ? worst_node(b, x) : failed_node_;
   finished(report);
   return report;
+}
+
+/// The node whose share of the residual is the largest.
+int IterativeSolver::worst_node(std::span<const double> b, std::span<const double> x) {
+  bound_error(b, x, false);
+  int worst = -1;
+  double most = -1.0;
+  for (int i = 0; i < system_->n(); ++i) {
+    const std::size_t at = system_->offset[i], dim = system_->dim[i];
+    const double share = sum_of_squares(std::span<const double>(b_).subspan(at, dim));
+    if (share > most) {
+      most = share;
+      worst = i;
+    }
+  }
+  return worst;
 }
 
 Report IterativeSolver::run(const BlockTree& A, std::span<const double> b, std::span<double> x) {

@@ -52,6 +52,7 @@ class IterativeSolver : public LinearSolver {
   Report run(const BlockTree& A, std::span<const double> b, std::span<double> x);
   bool rounding_may_matter(std::span<const double> x) const;
   void verify(std::span<const double> b, std::span<double> x, Report& report);
+  int worst_node(std::span<const double> b, std::span<const double> x);
   double bound_error(std::span<const double> b, std::span<const double> x, bool accurate);
 
   Coordinates coordinates_;
