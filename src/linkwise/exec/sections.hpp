@@ -14,8 +14,8 @@ enum class SectionOf { nodes = 1024, entries = 8192 };
 inline constexpr int max_sections = 256;
 
 struct Sections {
-  Sections(int n, SectionOf what)
-      : n(n),
+  Sections(int items, SectionOf what)
+      : n(items),
         length(std::max(static_cast<int>(what), (n + max_sections - 1) / max_sections)),
         count((n + length - 1) / length) {}
   int n, length, count;
