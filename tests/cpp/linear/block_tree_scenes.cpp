@@ -1,6 +1,6 @@
-#include <cmath>
-
 #include "linear/block_tree_scenes.hpp"
+
+#include <cmath>
 
 namespace linkwise::testing {
 namespace {
