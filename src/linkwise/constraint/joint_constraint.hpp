@@ -153,6 +153,26 @@ inline bool separate_complement(const Motion<double>* P, int n, Vector6<double>*
   return true;
 }
 
+/// Complement and dual of a single screw, whose translation is along its axis: what
+/// separate_complement() says of forces and moments holds here too, but for the wrench along the
+/// axis that does no work.
+inline bool screw_complement(const Motion<double>* P, int n, Vector6<double>* dual,
+                             Vector6<double>* complement) {
+  if (n != 1) return false;
+  const Vec3<double>&slide = P->lin, &turn = P->ang, off = cross(slide, turn);
+  if (dot(off, off) > 0) return false;
+  const double square = dot(slide, slide) + dot(turn, turn), size = std::sqrt(square);
+  dual[0] = to_array(Motion<double>{(1 / square) * slide, (1 / square) * turn});
+  Vec3<double> unused, across[2];
+  complement_of_directions(&turn, 1, &unused, across);
+  for (int i = 0; i < 2; ++i) {
+    complement[i] = to_array(Force<double>{across[i], {}});
+    complement[3 + i] = to_array(Force<double>{{}, across[i]});
+  }
+  complement[2] = to_array(Force<double>{(1 / size) * turn, (-1 / size) * slide});
+  return true;
+}
+
 /// P as columns: one for a one-axis joint.
 inline void calc_joint_constraint(const Motion<double>* P, const int* dof, int n,
                                   const std::vector<double>& armature,
@@ -160,7 +180,8 @@ inline void calc_joint_constraint(const Motion<double>* P, const int* dof, int n
   Vector6<double> complement[6];
   out.free = n;
   out.rows = 0;
-  if (!separate_complement(P, n, out.dual, complement))
+  if (!separate_complement(P, n, out.dual, complement) &&
+      !screw_complement(P, n, out.dual, complement))
     householder_complement(P, n, out.dual, complement);
   for (int i = 0; i < n; ++i) {
     out.dof[i] = dof[i];

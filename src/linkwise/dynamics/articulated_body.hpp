@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "linkwise/exec/thread_pool.hpp"
+#include "linkwise/kinematics/axis_frames.hpp"
 #include "linkwise/kinematics/body_state.hpp"
 #include "linkwise/kinematics/branches.hpp"
-#include "linkwise/spatial/hinge.hpp"
 
 namespace linkwise {
 
@@ -90,9 +90,6 @@ class ArticulatedBody {
     S u[6];
   };
 
-  static HingePlacement<double> placement(const BodyConstants<double>& k) {
-    return {k.cos_alpha, k.sin_alpha, k.a, k.d};
-  }
   template <class J>
   LW_INLINE Motion<S> seen_at_child(int n, const Motion<S>& v) const {
     if constexpr (J::is_hinge)

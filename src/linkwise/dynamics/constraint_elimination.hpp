@@ -9,18 +9,18 @@
 //     b = B^T (X alpha' + c_n - alpha_n) + tau / armature,     S f = b + K r_p
 // and leaves, with S = L D L^T and Z = L^-1 K,
 //     Phi_p = Phi' - Z^T D^-1 Z,    alpha_p = alpha' - Z^T D^-1 L^-1 b.
-// For the first joint on a body Phi' is its inverse inertia, so that for a joint that turns about z
-// X Phi' and X Phi' X^T are constants of the model in the frame before the turn. There B is a
-// selection and f keeps its components, so that nothing but Phi_n has to be turned.
+// For the first joint on a body Phi' is its inverse inertia, so that for a joint of one axis X Phi'
+// and X Phi' X^T are constants of the model in the frame before its motion. There B is a selection
+// (axis_constraint.hpp), so that nothing but Phi_n has to be moved. A system once eliminated is
+// solved again for other right-hand sides at a fraction of the cost.
 #include <limits>
 #include <memory>
 #include <type_traits>
-#include <utility>
 #include <vector>
 
-#include "linkwise/constraint/joint_constraint.hpp"
+#include "linkwise/dynamics/axis_constraint.hpp"
+#include "linkwise/dynamics/general_elimination.hpp"
 #include "linkwise/dynamics/inverse_dynamics.hpp"
-#include "linkwise/dynamics/joint_elimination.hpp"
 
 namespace linkwise {
 
@@ -31,39 +31,36 @@ class ConstraintElimination {
   explicit ConstraintElimination(const Model& model)
       : model_(&model),
         body_(model.n_bodies()),
-        general_(model.n_general),
-        slow_of_(model.n_bodies(), -1) {
+        across_(model.n_bodies()),
+        general_(model.n_general) {
     require_regular_inertias(model);
-    int slow = 0;
-    for (int n = 0; n < model.n_bodies(); ++n) {
+    for (int n = 0; n < model.n_bodies(); ++n)
       compliance_.push_back(invert_inertia(model.constants[n].inertia));
-      if (!turns(model.topology[n].kind)) slow_of_[n] = slow++;
-    }
-    slow_.resize(slow);
-    across_.resize(model.n_bodies());
-    for (int n = 0; n < model.n_bodies(); ++n) {
-      const BodyTopology& body = model.topology[n];
-      if (turns(body.kind))
-        set_across(n);
-      else if (body.kind != BodyKind::general)
-        set_axis(n);
-    }
+    for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+      using J = decltype(joint);
+      if constexpr (!is_general<J>)
+        for (int n = begin; n < end; ++n) {
+          const BodyTopology& body = model.topology[n];
+          if (body.parent >= 0 && body.first_to_give)
+            calc_across<J>(model.constants[n], compliance_[body.parent], across_[n]);
+        }
+    });
   }
 
   /// du [nv]; loads [n_joints][6] and forces, the unknowns in the order of TreeSystem's, or null.
   /// Returns false when some S is not positive definite: `failed_body`.
   bool evaluate(const SweepInput<S>& in, S* du, S* loads, S* forces = nullptr) {
     failed_body_ = -1;
-    calc_velocities(in);
-    tip_to_base<false>(in);
-    base_to_tip<false>(in, du);
+    sweep<false>(in, du);
     if (failed_body_ >= 0) return false;
-    if (loads)
-      store_joint_loads(
-          *model_, in.q, [&](int n) -> const Force<S>& { return body_[n].load; }, loads);
-    if (forces) for_forces([&, i = 0](const S& f) mutable { forces[i++] = f; });
-    correct(in, du, loads, forces);
+    finish(in, du, loads, forces);
     return true;
+  }
+
+  /// The same at the q of the last evaluate(), which succeeded, with its factors.
+  void evaluate_again(const SweepInput<S>& in, S* du, S* loads, S* forces = nullptr) {
+    sweep<true>(in, du);
+    finish(in, du, loads, forces);
   }
 
   int failed_body() const { return failed_body_; }
@@ -83,85 +80,45 @@ class ConstraintElimination {
     Motion<S> alpha;  ///< answer to no wrench
     Force<S> r;       ///< unknown wrench of the inboard joint, less those of outboard joints so far
     Force<S> load;    ///< wrench of the inboard joint
-    Motion<S> turn;   ///< Phi_n's column about z
-    S cosine, sine;
+    Motion<S> along;  ///< Phi_n's column of the drive's direction
+    AxisPose<S> at;
     JointElimination<S> joint;  ///< the inboard one
   };
-  /// A joint that does not turn about z.
-  struct SlowJoint {
-    Transform<S> X;
-    Motion<S> c;
-    Force<S> known;  ///< the drives' wrench
-    Compliance<S> Phi;
-    JointConstraint<S> joint;
-    Motion<S> P[6];
-  };
 
-  static bool turns(BodyKind kind) {
-    return kind == BodyKind::hinge || kind == BodyKind::revolute || kind == BodyKind::geared;
-  }
-  static HingePlacement<double> placement(const BodyConstants<double>& k) {
-    return {k.cos_alpha, k.sin_alpha, k.a, k.d};
-  }
-  /// Parent frame -> frame of body n before its turn about z, and wrenches back.
-  template <class J, class T>
-  LW_INLINE Motion<T> before_turn(int n, const Motion<T>& v) const {
-    if constexpr (J::is_hinge)
-      return to_child(placement(model_->constants[n]), v);
-    else
-      return model_->constants[n].tree * v;
-  }
-  template <class J>
-  LW_INLINE Force<S> at_parent(int n, const Force<S>& f) const {
-    if constexpr (J::is_hinge)
-      return to_parent(placement(model_->constants[n]), f);
-    else
-      return transpose_times(model_->constants[n].tree, f);
-  }
-  template <class J>
-  LW_INLINE Motion<S> after_turn(int n, Motion<S> v) const {
-    turn(body_[n].cosine, -body_[n].sine, v.lin.x, v.lin.y);
-    turn(body_[n].cosine, -body_[n].sine, v.ang.x, v.ang.y);
-    return v;
-  }
-  template <class J>
-  static constexpr int rows_of = J::leaves_zero_row ? 5 : 6;
-  template <class J>
-  static constexpr bool turning = std::is_base_of_v<RevoluteJoint, J>;
-
-  void set_across(int n) {
-    const BodyTopology& body = model_->topology[n];
-    if (body.parent < 0 || !body.first_to_give) return;
-    if (body.kind == BodyKind::hinge)
-      calc_across<HingeJoint>(n, compliance_[body.parent], across_[n]);
-    else
-      calc_across<RevoluteJoint>(n, compliance_[body.parent], across_[n]);
-  }
-
-  template <class J, class T>
-  void calc_across(int n, const Compliance<T>& Phi, Across<T>& out) const {
-    Vector6<T> columns[6];
-    for (int j = 0; j < 6; ++j) columns[j] = to_array(before_turn<J>(n, column(Phi, j)));
-    for (int i = 0; i < 6; ++i) {
-      T row[6];
-      for (int j = 0; j < 6; ++j) row[j] = columns[j][i];
-      const Motion<T> K = to_motion(row);
-      std::copy(row, row + 6, out.K[i]);
-      const Vector6<T> W = to_array(before_turn<J>(n, K));
-      for (int j = 0; j <= i; ++j) out.W[sym_index(i, j)] = W[j];
-    }
-  }
-
-  /// The constraint of a slide or a screw is constant.
-  void set_axis(int n) {
-    const BodyTopology& body = model_->topology[n];
-    SlowJoint& slow = slow_[slow_of_[n]];
-    const Motion<double> axis = element_column<double>(model_->elements[body.first_element], 0);
-    slow.P[0] = {axis.lin + Vec3<S>{}, axis.ang + Vec3<S>{}};
-    calc_joint_constraint(slow.P, &body.v, 1, armature(), slow.joint);
-  }
   const std::vector<double>& armature() const { return model_->dof_values(DofProperty::armature); }
 
+  /// f(rows), the number as a constant: five, or six where a joint drives through its rotor.
+  template <class J, class F>
+  LW_INLINE static void with_rows(const BodyConstants<double>& k, F&& f) {
+    using Five = std::integral_constant<int, 5>;
+    using Six = std::integral_constant<int, 6>;
+    if constexpr (J::leaves_zero_row)
+      f(Five{});
+    else if constexpr (!J::slides)
+      f(Six{});
+    else if (k.armature > 0)
+      f(Six{});
+    else
+      f(Five{});
+  }
+
+  /// `again`: of a system already eliminated.
+  template <bool again>
+  void sweep(const SweepInput<S>& in, S* du) {
+    calc_velocities<again>(in);
+    tip_to_base<again>(in);
+    base_to_tip(in, du);
+  }
+
+  void finish(const SweepInput<S>& in, S* du, S* loads, S* forces) {
+    if (loads)
+      store_joint_loads(
+          *model_, in.q, [&](int n) -> const Force<S>& { return body_[n].load; }, loads);
+    if (forces) for_forces([&, i = 0](const S& f) mutable { forces[i++] = f; });
+    correct(in, du, loads, forces);
+  }
+
+  template <bool again>
   void calc_velocities(const SweepInput<S>& in) {
     const Model& model = *model_;
     const Motion<S> resting{};
@@ -172,17 +129,23 @@ class ConstraintElimination {
         const BodyConstants<double>& k = model.constants[n];
         BodyWork& w = body_[n];
         const Motion<S>& v_parent = body.parent >= 0 ? body_[body.parent].v : resting;
-        if constexpr (turning<J>) {
-          sincos(S(in.q[body.q] + (J::is_hinge ? k.theta : 0.0)), w.sine, w.cosine);
-          Motion<S> v = after_turn<J>(n, before_turn<J>(n, v_parent));
-          J::add_rate(v, k.pitch, in.v ? in.v[body.v] : S{});
-          w.v = v;
+        if constexpr (is_general<J>) {
+          general_[body.general].calc_state(model, body, in, v_parent, again, w.v);
         } else {
-          calc_slow_velocity<J>(in, n, v_parent);
+          if constexpr (!again) calc_axis_pose<J>(k, in.q[body.q], w.at);
+          Motion<S> v = after_motion<J>(w.at, before_motion<J>(k, v_parent));
+          J::add_rate(v, k.pitch, in.v ? in.v[body.v] : S{});
+          store(w.v, v);
         }
         const Force<S> h = cross_dual(w.v, k.inertia * w.v);
         w.g = {-h.lin, -h.ang};
-        add_drive<J>(in, n, body);
+        if constexpr (is_general<J>)
+          general_[body.general].add_drives(armature(), in.tau, w.g,
+                                            body.parent >= 0 ? &body_[body.parent].g : nullptr);
+        else
+          with_rows<J>(k, [&](auto rows) {
+            if constexpr (rows == 5) add_drive<J>(in.tau[body.v], n, body);
+          });
       }
     });
     if (in.external)
@@ -191,62 +154,26 @@ class ConstraintElimination {
           body_[model.joints[j].body].g += user_wrench(in.external, model.joints[j], j);
   }
 
+  /// A drive without rotor: a plain torque or force on z, which the joint's motion leaves alone.
   template <class J>
-  void calc_slow_velocity(const SweepInput<S>& in, int n, const Motion<S>& v_parent) {
-    const BodyTopology& body = model_->topology[n];
-    const BodyConstants<double>& k = model_->constants[n];
-    SlowJoint& slow = slow_[slow_of_[n]];
-    if constexpr (is_general<J>) {
-      BodyState<S> state;
-      GeneralState<S>& g = general_[body.general];
-      calc_general_state(*model_, body, in, v_parent, state, g);
-      slow.X = state.X;
-      slow.c = state.c;
-      body_[n].v = state.v;
-      for (int i = 0; i < g.n; ++i) slow.P[i] = g.P[i];
-      calc_joint_constraint(g.P, g.dof, g.n, armature(), slow.joint);
+  LW_INLINE void add_drive(const S& tau, int n, const BodyTopology& body) {
+    const auto& tree = model_->constants[n].tree;
+    const auto& R = tree.R.m;
+    const Vec3<S> on_parent{R[6] * tau, R[7] * tau, R[8] * tau};
+    Force<S>& g = body_[n].g;
+    if constexpr (J::turns) {
+      g.ang.z += tau;
+      if (body.parent >= 0) body_[body.parent].g.ang -= on_parent;
     } else {
-      const S u = in.v ? in.v[body.v] : S{};
-      slow.X = J::pose(k.tree, k.pitch, in.q[body.q]);
-      Motion<S> v = slow.X * v_parent;
-      J::add_rate(v, k.pitch, u);
-      slow.c = J::bias(v, k.pitch, u);
-      body_[n].v = v;
+      g.lin.z += tau;
+      if (body.parent >= 0) body_[body.parent].g -= Force<S>{on_parent, cross(tree.r, on_parent)};
     }
   }
 
-  /// The known wrench of joint n's drive, which is a plain torque where it turns.
-  template <class J>
-  LW_INLINE void add_drive(const SweepInput<S>& in, int n, const BodyTopology& body) {
-    if constexpr (turning<J>) {
-      if constexpr (rows_of<J> == 6) return;  // drives through the rotor
-      const S tau = in.tau[body.v];
-      body_[n].g.ang.z += tau;
-      if (body.parent < 0) return;
-      const auto& R = model_->constants[n].tree.R.m;
-      Vec3<S>& moment = body_[body.parent].g.ang;
-      moment.x -= R[6] * tau;
-      moment.y -= R[7] * tau;
-      moment.z -= R[8] * tau;
-    } else {
-      SlowJoint& slow = slow_[slow_of_[n]];
-      slow.known = {};
-      for (int i = 0; i < slow.joint.free; ++i) {
-        const int dof = slow.joint.dof[i];
-        if (armature()[dof] > 0) continue;
-        const Force<S> one = to_force(slow.joint.dual[i].data());
-        slow.known += Force<S>{in.tau[dof] * one.lin, in.tau[dof] * one.ang};
-      }
-      body_[n].g += slow.known;
-      if (body.parent >= 0) body_[body.parent].g -= transpose_times(slow.X, slow.known);
-    }
-  }
-
-  /// `response`: of a system already eliminated, at rest and without gravity.
-  template <bool response>
+  template <bool again>
   void tip_to_base(const SweepInput<S>& in) {
     const Model& model = *model_;
-    const Motion<S> ground = ground_acceleration<S>(model, response ? 0.0 : in.gravity_factor);
+    const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
     for_runs_tip_to_base(model, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = end - 1; n >= begin; --n) {
@@ -256,38 +183,34 @@ class ConstraintElimination {
         if (body.first_to_give)
           body_[body.parent].alpha = compliance_[body.parent] * body_[body.parent].g;
         const Motion<S>& a_parent = body.parent >= 0 ? body_[body.parent].alpha : ground;
-        if constexpr (turning<J>)
-          eliminate_turning<J, response>(in, n, body, a_parent);
+        if constexpr (is_general<J>)
+          eliminate_general<again>(in, n, body, a_parent);
         else
-          eliminate_slow<response>(in, n, body, a_parent);
+          with_rows<J>(model.constants[n],
+                       [&](auto rows) { eliminate_axis<J, rows, again>(in, n, body, a_parent); });
       }
     });
   }
 
-  template <class J, bool response>
-  LW_INLINE void eliminate_turning(const SweepInput<S>& in, int n, const BodyTopology& body,
-                                   const Motion<S>& a_parent) {
-    constexpr int rows = rows_of<J>;
+  template <class J, int rows, bool again>
+  LW_INLINE void eliminate_axis(const SweepInput<S>& in, int n, const BodyTopology& body,
+                                const Motion<S>& a_parent) {
     BodyWork& w = body_[n];
+    const BodyConstants<double>& k = model_->constants[n];
     Motion<S> gap = w.alpha;
-    if constexpr (!response) gap += RevoluteJoint::bias(w.v, 0.0, in.v ? S(-in.v[body.v]) : S{});
-    turn(w.cosine, w.sine, gap.lin.x, gap.lin.y);
-    turn(w.cosine, w.sine, gap.ang.x, gap.ang.y);
-    const Motion<S> carried = before_turn<J>(n, a_parent);
-    S b[6] = {carried.lin.x - gap.lin.x, carried.lin.y - gap.lin.y, carried.lin.z - gap.lin.z,
-              carried.ang.x - gap.ang.x, carried.ang.y - gap.ang.y, carried.ang.z - gap.ang.z};
-    const double armature = rows == 6 ? model_->constants[n].armature : 0.0;
-    if constexpr (rows == 6) b[5] = b[5] + in.tau[body.v] / armature;
-    if constexpr (!response) {
+    gap += J::bias(w.v, k.pitch, in.v ? S(-in.v[body.v]) : S{});
+    undo_motion<J>(w.at, gap);
+    const Motion<S> carried = before_motion<J>(k, a_parent);
+    S b[6];
+    to_components<J>(Motion<S>{carried.lin - gap.lin, carried.ang - gap.ang}, k.pitch, b);
+    if constexpr (rows == 6) b[5] = b[5] + in.tau[body.v] / k.armature;
+    if constexpr (!again) {
       Compliance<S> Phi = body.n_children > 0 ? widen<S>(w.joint.Phi) : widen<S>(compliance_[n]);
-      w.turn = column(Phi, 5);
-      turn_back(w.cosine, w.sine, Phi);
+      w.along = column(Phi, J::turns ? 5 : 2);
+      undo_motion<J>(w.at, Phi);
       S D[21];
-#pragma GCC unroll 6
-      for (int i = 0; i < rows; ++i)
-#pragma GCC unroll 6
-        for (int j = 0; j <= i; ++j) D[sym_index(i, j)] = entry(Phi, i, j);
-      if constexpr (rows == 6) D[20] = D[20] + 1 / armature;
+      to_components<J, rows>(Phi, k.pitch, D);
+      if constexpr (rows == 6) D[20] = D[20] + 1 / k.armature;
       if (body.parent < 0) {
         check(w.joint.template eliminate_root<rows>(D), n);
       } else if (body.first_to_give) {
@@ -296,7 +219,7 @@ class ConstraintElimination {
               n);
       } else {
         Across<S> across;
-        calc_across<J>(n, body_[body.parent].joint.Phi, across);
+        calc_across<J>(k, body_[body.parent].joint.Phi, across);
         check(w.joint.template eliminate<rows>(D, across, body_[body.parent].joint.Phi,
                                                body_[body.parent].joint.Phi),
               n);
@@ -306,37 +229,22 @@ class ConstraintElimination {
     if (body.parent >= 0) body_[body.parent].alpha += Motion<S>{-taken.lin, -taken.ang};
   }
 
-  template <bool response>
-  void eliminate_slow(const SweepInput<S>& in, int n, const BodyTopology& body,
-                      const Motion<S>& a_parent) {
+  template <bool again>
+  void eliminate_general(const SweepInput<S>& in, int n, const BodyTopology& body,
+                         const Motion<S>& a_parent) {
     BodyWork& w = body_[n];
-    SlowJoint& slow = slow_[slow_of_[n]];
-    const JointConstraint<S>& joint = slow.joint;
-    Motion<S> gap = slow.X * a_parent;
-    if constexpr (!response) gap += slow.c;
-    gap += Motion<S>{-w.alpha.lin, -w.alpha.ang};
-    S b[6] = {};
-    for (int i = 0; i < joint.rows; ++i) {
-      b[i] = dot(gap, to_force(joint.B[i].data()));
-      if (const int dof = joint.armature_of[i]; dof >= 0)
-        b[i] = b[i] + in.tau[dof] / armature()[dof];
-    }
-    if constexpr (!response) {
-      slow.Phi = body.n_children > 0 ? w.joint.Phi : widen<S>(compliance_[n]);
+    GeneralElimination<S>& general = general_[body.general];
+    S b[6];
+    general.calc_gap(armature(), in.tau, a_parent, w.alpha, b);
+    if constexpr (!again) {
+      S D[21];
+      Across<S> across;
       Compliance<S> before{};
       if (body.parent >= 0)
         before =
             body.first_to_give ? widen<S>(compliance_[body.parent]) : body_[body.parent].joint.Phi;
-      // Rows that are missing to six are empty but for a one on the diagonal.
-      Across<S> across{};
-      project(slow, before, across);
-      S D[21] = {};
-      for (int i = 0; i < 6; ++i) D[sym_index(i, i)] = broadcast<S>(1);
-      for (int i = 0; i < joint.rows; ++i) {
-        const Motion<S> y = slow.Phi * to_force(joint.B[i].data());
-        for (int j = 0; j <= i; ++j) D[sym_index(i, j)] = dot(y, to_force(joint.B[j].data()));
-        D[sym_index(i, i)] = D[sym_index(i, i)] + joint.compliance[i];
-      }
+      general.assemble(body.n_children > 0 ? w.joint.Phi : widen<S>(compliance_[n]), before, D,
+                       across);
       if (body.parent >= 0)
         check(w.joint.template eliminate<6>(D, across, before, body_[body.parent].joint.Phi), n);
       else
@@ -346,82 +254,56 @@ class ConstraintElimination {
     if (body.parent >= 0) body_[body.parent].alpha += Motion<S>{-taken.lin, -taken.ang};
   }
 
-  /// B^T X Phi' X^T B and B^T X Phi'.
-  static void project(const SlowJoint& slow, const Compliance<S>& before, Across<S>& out) {
-    for (int i = 0; i < slow.joint.rows; ++i) {
-      const Force<S> lever = transpose_times(slow.X, to_force(slow.joint.B[i].data()));
-      const Motion<S> K = before * lever;
-      const Vector6<S> row = to_array(K);
-      std::copy(row.begin(), row.end(), out.K[i]);
-      const Motion<S> carried = slow.X * K;
-      for (int j = 0; j <= i; ++j)
-        out.W[sym_index(i, j)] = dot(carried, to_force(slow.joint.B[j].data()));
-    }
-  }
-
-  template <bool response>
   void base_to_tip(const SweepInput<S>& in, S* du) {
     const Model& model = *model_;
-    const Motion<S> ground = ground_acceleration<S>(model, response ? 0.0 : in.gravity_factor);
-    const Force<S> nothing{};
+    const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
     for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];
-        BodyWork& w = body_[n];
         const Motion<S>& a_parent = body.parent >= 0 ? body_[body.parent].v : ground;
-        if constexpr (turning<J>) {
-          constexpr int rows = rows_of<J>;
-          w.joint.template solve_back<rows>(body.parent >= 0 ? body_[body.parent].r : nothing);
-          Force<S> r{{w.joint.f[0], w.joint.f[1], w.joint.f[2]},
-                     {w.joint.f[3], w.joint.f[4], rows == 6 ? w.joint.f[5] : S{}}};
-          if (body.parent >= 0) body_[body.parent].r -= at_parent<J>(n, r);
-          turn(w.cosine, -w.sine, r.lin.x, r.lin.y);
-          turn(w.cosine, -w.sine, r.ang.x, r.ang.y);
-          Motion<S> a = after_turn<J>(n, before_turn<J>(n, a_parent));
-          if constexpr (!response) a += J::bias(w.v, 0.0, in.v ? in.v[body.v] : S{});
-          const S rate = dot(w.turn, r) + w.alpha.ang.z - a.ang.z;
-          du[body.v] = rate;
-          a.ang.z += rate;
-          w.v = a;
-          store(w.r, r);
-          if constexpr (rows == 5) r.ang.z = in.tau[body.v];
-          store(w.load, r);
-        } else {
-          accelerate_slow<response>(in, n, body, a_parent, du);
-        }
+        if constexpr (is_general<J>)
+          accelerate_general(in, n, body, a_parent, du);
+        else
+          with_rows<J>(model.constants[n],
+                       [&](auto rows) { accelerate_axis<J, rows>(in, n, body, a_parent, du); });
       }
     });
   }
 
-  template <bool response>
-  void accelerate_slow(const SweepInput<S>& in, int n, const BodyTopology& body,
-                       const Motion<S>& a_parent, S* du) {
+  template <class J, int rows>
+  LW_INLINE void accelerate_axis(const SweepInput<S>& in, int n, const BodyTopology& body,
+                                 const Motion<S>& a_parent, S* du) {
+    const Force<S> nothing{};
+    const BodyConstants<double>& k = model_->constants[n];
+    BodyWork& w = body_[n];
+    w.joint.template solve_back<rows>(body.parent >= 0 ? body_[body.parent].r : nothing);
+    Force<S> r = to_wrench<J>(w.joint.f, rows == 6 ? w.joint.f[5] : S{}, k.pitch);
+    if (body.parent >= 0) body_[body.parent].r -= at_parent<J>(k, r);
+    apply_motion<J>(w.at, r);
+    Motion<S> a = after_motion<J>(w.at, before_motion<J>(k, a_parent));
+    a += J::bias(w.v, k.pitch, in.v ? in.v[body.v] : S{});
+    const S rate = dot(w.along, r) + rate_of<J>(w.alpha) - rate_of<J>(a);
+    du[body.v] = rate;
+    J::add_rate(a, k.pitch, rate);
+    store(w.v, a);
+    store(w.r, r);
+    if constexpr (rows == 5) (J::turns ? r.ang.z : r.lin.z) += in.tau[body.v];
+    store(w.load, r);
+  }
+
+  void accelerate_general(const SweepInput<S>& in, int n, const BodyTopology& body,
+                          const Motion<S>& a_parent, S* du) {
     const Force<S> nothing{};
     BodyWork& w = body_[n];
-    const SlowJoint& slow = slow_[slow_of_[n]];
-    const JointConstraint<S>& joint = slow.joint;
+    const GeneralElimination<S>& general = general_[body.general];
     w.joint.template solve_back<6>(body.parent >= 0 ? body_[body.parent].r : nothing);
-    Force<S> r{};
-    for (int i = 0; i < joint.rows; ++i) {
-      const Force<S> B = to_force(joint.B[i].data());
-      r += Force<S>{w.joint.f[i] * B.lin, w.joint.f[i] * B.ang};
-    }
-    if (body.parent >= 0) body_[body.parent].r -= transpose_times(slow.X, r);
-    Motion<S> a = slow.X * a_parent;
-    if constexpr (!response) a += slow.c;
-    Motion<S> gap = slow.Phi * r;
-    gap += w.alpha;
-    gap += Motion<S>{-a.lin, -a.ang};
-    for (int i = 0; i < joint.free; ++i) {
-      const S rate = dot(gap, to_force(joint.dual[i].data()));
-      du[joint.dof[i]] = rate;
-      a += Motion<S>{rate * slow.P[i].lin, rate * slow.P[i].ang};
-    }
-    if constexpr (!response) copy_prescribed(*model_, body, in, du);
-    w.v = a;
+    const Force<S> r = general.wrench(w.joint.f);
+    if (body.parent >= 0) body_[body.parent].r -= general.at_parent(r);
+    w.v = general.accelerate(a_parent, w.alpha, r, du);
+    copy_prescribed(*model_, body, in, du);
     w.r = w.load = r;
-    w.load += slow.known;
+    w.load += general.known();
   }
 
   /// Largest difference of the bodies' accelerations from what their wrenches give, over the
@@ -462,13 +344,9 @@ class ConstraintElimination {
     SweepInput<S> rest;
     rest.q = in.q;
     rest.tau = missing_.data();
-    for (BodyWork& w : body_) w.g = {};
-    for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
-      for (int n = begin; n < end; ++n) add_drive<decltype(joint)>(rest, n, model.topology[n]);
-    });
+    rest.gravity_factor = 0;
     response_.assign(model.nv(), S{});
-    tip_to_base<true>(rest);
-    base_to_tip<true>(rest, response_.data());
+    sweep<true>(rest, response_.data());
     const auto where = [&](const S& yes, const S& no) {
       return off > acceptable_violation ? yes : no;
     };
@@ -481,18 +359,31 @@ class ConstraintElimination {
     for (int i = 0; i < n_loads; ++i) loads[i] = where(given_loads_[i] + response_[i], loads[i]);
   }
 
+  /// In the bases that calc_joint_constraint() chooses.
   template <class Out>
   void for_forces(Out&& out) const {
-    for (int n = 0; n < model_->n_bodies(); ++n) {
-      const BodyWork& w = body_[n];
-      if (slow_of_[n] >= 0) {
-        for (int i = 0; i < slow_[slow_of_[n]].joint.rows; ++i) out(w.joint.f[i]);
-        continue;
+    for_runs_base_to_tip(*model_, [&](auto joint, int begin, int end) {
+      using J = decltype(joint);
+      for (int n = begin; n < end; ++n) {
+        const BodyWork& w = body_[n];
+        if constexpr (is_general<J>) {
+          for (int i = 0; i < general_[model_->topology[n].general].rows(); ++i) out(w.joint.f[i]);
+        } else {
+          const BodyConstants<double>& k = model_->constants[n];
+          const Force<S>& r = w.load;
+          if (k.armature > 0) out(J::project(r, k.pitch));
+          out(r.lin.x);
+          out(r.lin.y);
+          if constexpr (!J::slides)
+            out(r.lin.z);
+          else if constexpr (J::turns)
+            out((r.lin.z - k.pitch * r.ang.z) / std::sqrt(1 + k.pitch * k.pitch));
+          out(r.ang.x);
+          out(r.ang.y);
+          if constexpr (!J::turns) out(r.ang.z);
+        }
       }
-      const Force<S>& r = w.load;
-      if (model_->topology[n].kind == BodyKind::geared) out(r.ang.z);
-      for (const S& x : {r.lin.x, r.lin.y, r.lin.z, r.ang.x, r.ang.y}) out(x);
-    }
+    });
   }
 
   LW_INLINE void check(const S& d, int n) {
@@ -503,10 +394,8 @@ class ConstraintElimination {
   const Model* model_;
   std::vector<BodyWork> body_;
   std::vector<Compliance<double>> compliance_;  ///< the bodies' own
-  std::vector<Across<double>> across_;
-  std::vector<GeneralState<S>> general_;
-  std::vector<int> slow_of_;  ///< body -> index into slow_, or -1 where the joint turns about z
-  std::vector<SlowJoint> slow_;
+  std::vector<Across<double>> across_;          ///< of each body's first joint of one axis
+  std::vector<GeneralElimination<S>> general_;
   std::unique_ptr<InverseDynamics<S>> inverse_;  ///< made for the first correction
   std::vector<S> missing_, response_, given_loads_;
   int failed_body_ = -1;

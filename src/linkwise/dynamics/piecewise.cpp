@@ -3,6 +3,7 @@
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/piece_kernels.hpp"
 #include "linkwise/exec/thread_pool.hpp"
+#include "linkwise/kinematics/axis_frames.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
@@ -14,10 +15,6 @@ using Group = Lanes<native_lanes>;
 constexpr int fewest_for_threads = 128;
 
 int threads_for(int n_bodies, int threads) { return n_bodies < fewest_for_threads ? 1 : threads; }
-
-HingePlacement<double> placement(const BodyConstants<double>& k) {
-  return {k.cos_alpha, k.sin_alpha, k.a, k.d};
-}
 
 template <class A, class B>
 void set_lanes(A& to, int l, const B& from) {

@@ -20,6 +20,8 @@ LW_INLINE Mat3<S> turn_about_z(const Mat3<C>& R, S cosine, S sine) {
 }
 
 struct RevoluteJoint {
+  /// What the joint does to its frame: turn about z, slide along z.
+  static constexpr bool turns = true, slides = false;
   /// Eliminating the joint leaves an inertia that is zero about z: PlanarInertia.
   static constexpr bool leaves_zero_row = true;
   /// The placement is that of Denavit and Hartenberg.
@@ -63,6 +65,7 @@ struct GearedJoint : RevoluteJoint {
 };
 
 struct PrismaticJoint {
+  static constexpr bool turns = false, slides = true;
   static constexpr bool leaves_zero_row = false, is_hinge = false;
 
   template <class S, class C>
@@ -93,6 +96,7 @@ struct PrismaticJoint {
 
 /// A screw: P = (0, 0, pitch, 0, 0, 1).
 struct HelicalJoint {
+  static constexpr bool turns = true, slides = true;
   static constexpr bool leaves_zero_row = false, is_hinge = false;
 
   template <class S, class C>

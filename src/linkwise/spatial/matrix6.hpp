@@ -124,6 +124,26 @@ LW_INLINE void turn_back(const S& c, const S& s, Compliance<S>& L) {
   turn(c, s, L.C.m[3], L.C.m[4]);
 }
 
+/// L seen from an origin moved along z by minus d: B' = B + E C, A' = A + E B^T + B' E^T, where
+/// E w = d z x w.
+template <class S>
+LW_INLINE void slide_back(const S& d, Compliance<S>& L) {
+  auto& A = L.A.m;
+  auto& B = L.B.m;
+  const auto& C = L.C.m;
+  const S b01 = B[1], b00 = B[0], b10 = B[3];
+#pragma GCC unroll 3
+  for (int j = 0; j < 3; ++j) {
+    B[j] = B[j] - d * C[sym_index(1, j)];
+    B[3 + j] = B[3 + j] + d * C[sym_index(0, j)];
+  }
+  A[0] = A[0] - d * (b01 + B[1]);
+  A[1] = A[1] + d * (b00 - B[4]);
+  A[2] = A[2] + d * (b10 + B[3]);
+  A[3] = A[3] - d * B[7];
+  A[4] = A[4] + d * B[6];
+}
+
 template <class C>
 LW_INLINE Matrix6<C> to_matrix(const Compliance<C>& L) {
   Matrix6<C> out;
