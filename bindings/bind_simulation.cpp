@@ -115,12 +115,17 @@ SimulationOptions options_of(const std::string& method, const std::string& solve
                              const std::string& guess, const std::string& stop,
                              nb::handle solver_tolerance, nb::handle max_iterations,
                              nb::handle solver_options, const std::string& state,
-                             const std::string& integrator, double tolerance, nb::handle step,
-                             nb::handle max_step, int threads) {
+                             const std::string& integrator, double tolerance,
+                             nb::handle step_tolerance, nb::handle step, nb::handle max_step,
+                             int threads) {
   SimulationOptions o;
   o.dynamics.threads = checked_threads(threads);
   if (!(tolerance > 0) || !std::isfinite(tolerance))
     throw InputError("tolerance must be a positive number; 1e-6 is usual");
+  const double allowed_a_step =
+      step_tolerance.is_none() ? step_share * tolerance : nb::cast<double>(step_tolerance);
+  if (!(allowed_a_step > 0) || !std::isfinite(allowed_a_step))
+    throw InputError("step_tolerance must be a positive number; a tenth of tolerance is usual");
   o.dynamics.method = method;
   o.dynamics.solver = solver;
   o.dynamics.initial_guess = guess;
@@ -128,14 +133,14 @@ SimulationOptions options_of(const std::string& method, const std::string& solve
   // The constraint forces perturb the accelerations by as much: a tenth of the step's error
   // [sharf1993].
   o.dynamics.solver_options.tolerance =
-      solver_tolerance.is_none() ? tolerance / 10 : nb::cast<double>(solver_tolerance);
+      solver_tolerance.is_none() ? allowed_a_step / 10 : nb::cast<double>(solver_tolerance);
   if (!max_iterations.is_none())
     o.dynamics.solver_options.max_iterations = nb::cast<int>(max_iterations);
   read_solver_options(solver_options, o.dynamics);
   o.follow_error_test = solver_tolerance.is_none() && !gives_tolerance(solver_options);
   o.state = state_choice_from_name(state);
   o.integrator = find_integrator(integrator).kind;
-  o.integration.tolerance = tolerance;
+  o.integration.tolerance = allowed_a_step;
   if (!step.is_none()) o.integration.step = nb::cast<double>(step);
   if (!max_step.is_none()) o.integration.max_step = nb::cast<double>(max_step);
   return o;
@@ -151,17 +156,17 @@ void bind_simulation(nb::module_& m) {
              const std::string& solver, const std::string& guess, const std::string& stop,
              nb::object solver_tolerance, nb::object max_iterations, nb::object solver_options,
              const std::string& state, const std::string& integrator, double tolerance,
-             nb::object step, nb::object max_step, nb::object threads) {
+             nb::object step_tolerance, nb::object step, nb::object max_step, nb::object threads) {
             new (self) PySimulation(
                 model, options_of(method, solver, guess, stop, solver_tolerance, max_iterations,
-                                  solver_options, state, integrator, tolerance, step, max_step,
-                                  threads_of(threads, 1 << 20)));
+                                  solver_options, state, integrator, tolerance, step_tolerance, step,
+                                  max_step, threads_of(threads, 1 << 20)));
           },
           "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto",
           "initial_guess"_a = "cubic", "stop"_a = "energy_norm", "solver_tolerance"_a = nb::none(),
           "max_iterations"_a = nb::none(), "solver_options"_a = nb::none(),
           "state"_a = "joint_rates", "integrator"_a = "adams", "tolerance"_a = 1e-6,
-          "step"_a = nb::none(), "max_step"_a = nb::none(), "threads"_a = nb::none())
+          "step_tolerance"_a = nb::none(), "step"_a = nb::none(), "max_step"_a = nb::none(), "threads"_a = nb::none())
       .def("drive_torque", &PySimulation::torque, "joint"_a, "values"_a)
       .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a,
            "interpolation"_a = "linear")
@@ -221,6 +226,9 @@ void bind_simulation(nb::module_& m) {
       .def_prop_ro(
           "velocity_drift", [](const PySimulation& s) { return s.simulation.velocity_drift(); },
           "State body_velocities: how far joints come apart at the last sample, m/s or rad/s.")
+      .def_prop_ro(
+          "step_tolerance",
+          [](const PySimulation& s) { return s.simulation.options().integration.tolerance; })
       .def_prop_ro("method", [](const PySimulation& s) { return s.simulation.choice().method; })
       .def_prop_ro("solver", [](const PySimulation& s) { return s.simulation.choice().solver; })
       .def_prop_ro("reason", [](const PySimulation& s) { return s.simulation.choice().reason; });

@@ -106,6 +106,7 @@ def driven_motion(model: Model, arguments: Mapping[str, Any], states: int) -> Mo
         method=REFERENCE,
         integrator=arguments.get("integrator", "adams"),
         tolerance=arguments.get("tolerance", 1e-6),
+        step_tolerance=arguments.get("step_tolerance"),
         step=arguments.get("step"),
         max_step=arguments.get("max_step"),
     )

@@ -152,6 +152,7 @@ def simulate(
     every: float | None = None,
     times: npt.ArrayLike | None = None,
     tolerance: float = 1e-6,
+    step_tolerance: float | None = None,
     integrator: str = "adams",
     method: str = "auto",
     solver: str = "auto",
@@ -184,7 +185,9 @@ def simulate(
         v0: Initial velocities, shape (nv,); zero by default.
         every: Interval between samples [s]; a thousandth of the duration by default.
         times: The sample times instead [s], increasing.
-        tolerance: Local error allowed a step, relative to the size of the state and absolute.
+        tolerance: Accuracy to aim at, relative to the size of the state and absolute.
+        step_tolerance: Error allowed in one step, in the same measure; a tenth of `tolerance` by
+            default, which it replaces where given.
         integrator: "adams", "bdf", "runge_kutta_4" or "semi_implicit_euler"; the last two take
             fixed steps of `step` seconds.
         method: How accelerations are computed: "auto", or one of linkwise.methods().
@@ -230,6 +233,7 @@ def simulate(
     options = {
         "integrator": integrator,
         "tolerance": number("tolerance", tolerance),
+        "step_tolerance": optional_number("step_tolerance", step_tolerance),
         "method": method,
         "solver": solver,
         "initial_guess": initial_guess,
@@ -251,6 +255,7 @@ def simulate(
         except InputError as error:
             raise InputError(f"drives[{joint!r}]: {error}") from None
     simulation = _core.Simulation(model, **options)
+    options["step_tolerance"] = simulation.step_tolerance
     for joint, drive in by_joint.items():
         drive.apply(simulation, joint)
     for body, wrench in by_body.items():

@@ -55,7 +55,11 @@ def test_open_loop_end_point(manoeuvre, method):
         )
         return np.abs(q - END[manoeuvre]).max()
 
-    coarse, fine = miss(1e-6), miss(1e-9)
-    assert coarse <= 100 * 1e-6
-    assert fine <= 100 * 1e-9
-    assert fine <= 1e-2 * coarse
+    # Which steps are taken, and with what sign of their errors, is partly chance.
+    around = np.array([0.6, 0.8, 1.0, 1.25, 1.6])
+    coarse, fine = [miss(t) for t in 1e-5 * around], [miss(t) for t in 1e-9 * around]
+    assert max(coarse) <= 10 * 1e-5
+    assert miss(1e-6) <= 10 * 1e-6
+    assert max(fine) <= 100 * 1e-9
+    # Four decades of tolerance bring at least two and a half of accuracy.
+    assert np.median(fine) <= 3e-3 * np.median(coarse)

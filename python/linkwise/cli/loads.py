@@ -118,7 +118,7 @@ def tighter_run(run: Run, path: Path, quiet: bool) -> Run:
     arguments = scenario.simulate_arguments(machine)
     used = json.loads(run.dataset.attrs["options"])
     arguments |= {
-        "tolerance": used["tolerance"] / TIGHTER,
+        "step_tolerance": used["step_tolerance"] / TIGHTER,
         "times": run.dataset["time"].values,
         "every": None,
         "duration": None,

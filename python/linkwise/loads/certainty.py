@@ -83,9 +83,9 @@ def _algebraic(run: Run, model: Model, names: list[str]) -> Array:
     return worst
 
 
-def _tolerance(run: Run) -> float:
+def _step_tolerance(run: Run) -> float:
     options = json.loads(run.dataset.attrs.get("options", "{}"))
-    return float(options.get("tolerance", np.nan))
+    return float(options.get("step_tolerance", np.nan))
 
 
 def _check_tighter(run: Run, tighter: Run) -> None:
@@ -97,10 +97,10 @@ def _check_tighter(run: Run, tighter: Run) -> None:
     for key in ("model", "model_joints", "drives", "wrenches"):
         if run.dataset.attrs.get(key) != tighter.dataset.attrs.get(key):
             raise InputError(f"the tighter run has another {key}; simulate the same machine alike")
-    loose, tight = _tolerance(run), _tolerance(tighter)
+    loose, tight = _step_tolerance(run), _step_tolerance(tighter)
     if not tight <= loose / 10:
         raise InputError(
-            f"the tighter run has tolerance {tight:g}, the run {loose:g}; "
+            f"the tighter run has step_tolerance {tight:g}, the run {loose:g}; "
             f"simulate it with {loose / TIGHTER:g}"
         )
 

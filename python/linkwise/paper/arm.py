@@ -110,7 +110,7 @@ def run_maneuver(
         max_iterations=MOST_ITERATIONS,
         solver_options={"history": protocol.history, **(solver_options or {})},
         integrator="adams",
-        tolerance=protocol.tolerance,
+        step_tolerance=protocol.tolerance,
     )
     maneuver.apply_torques(model, simulation)
     simulation.keep_trace()

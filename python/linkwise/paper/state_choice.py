@@ -37,7 +37,7 @@ def _run(maneuver: Maneuver, solver: str, state: str) -> dict[str, Any]:
         solver_tolerance=PAPER_PROTOCOL.solver_tolerance,
         max_iterations=MOST_ITERATIONS,
         state=state,
-        tolerance=PAPER_PROTOCOL.tolerance,
+        step_tolerance=PAPER_PROTOCOL.tolerance,
     )
     maneuver.apply_torques(model, simulation)
     simulation.start(0.0, np.array(maneuver.start), np.zeros(model.nv))

@@ -257,6 +257,7 @@ class SimulateSection(Section):
 
     duration: Time
     tolerance: Annotated[Number, Field(gt=0)] = 1e-6
+    step_tolerance: Annotated[Number, Field(gt=0)] | None = None
     integrator: str = "adams"
     method: str = "auto"
     solver: str = "auto"

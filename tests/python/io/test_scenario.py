@@ -53,6 +53,7 @@ def test_defaults(write):
         "solver": "auto",
         "initial_guess": "cubic",
         "stop": "energy_norm",
+        "step_tolerance": None,
         "solver_tolerance": None,
         "max_iterations": None,
         "step": None,

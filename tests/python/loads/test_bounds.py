@@ -43,7 +43,7 @@ def test_without_a_tighter_run_the_integration_is_not_known(swing):
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        ({"tolerance": 1e-7}, "tolerance 1e-07, the run 1e-07; simulate it with 1e-09"),
+        ({"tolerance": 1e-7}, "step_tolerance 1e-08, the run 1e-08; simulate it with 1e-10"),
         ({"every": 0.1}, "other samples or joints"),
         ({"drives": {"elbow": 2.0}}, "another drives"),
         ({"model": lw.scenes.srms()}, "other samples or joints"),

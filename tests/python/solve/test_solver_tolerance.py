@@ -19,7 +19,7 @@ def follow(maneuver, solver, tolerance=TOLERANCE, **options):
             "solver": solver,
             "initial_guess": "projection",
             "max_iterations": 200_000,
-            "tolerance": tolerance,
+            "step_tolerance": tolerance,
             **options,
         },
     )

@@ -90,7 +90,7 @@ def _simulator(model: Model, states: States, entry: dict[str, Any]) -> Simulator
     name, fixed = entry["name"], bool(entry["fixed_step"])
 
     def simulate(duration: float, setting: float) -> Motion:
-        accuracy: dict[str, Any] = {"step" if fixed else "tolerance": setting}
+        accuracy: dict[str, Any] = {"step" if fixed else "step_tolerance": setting}
         # The loop alone, as of the peers: lw.simulate labels and records the results as well.
         loop = _core.Simulation(model, integrator=name, **accuracy)
         start = time.process_time()
