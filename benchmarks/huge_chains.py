@@ -27,7 +27,7 @@ from linkwise.record.provenance import versions
 
 G = 9.81
 CASES = {
-    100_000: {"times": [0.0, 1.0], "tolerance": 1e-6},
+    100_000: {"times": [0.0, 1.0], "step_tolerance": 1e-6},
     1_000_000: {"times": [0.0, 0.01], "integrator": "runge_kutta_4", "step": 2e-3},
 }
 #: What the process takes without any chain.

@@ -159,14 +159,15 @@ void bind_simulation(nb::module_& m) {
              nb::object step_tolerance, nb::object step, nb::object max_step, nb::object threads) {
             new (self) PySimulation(
                 model, options_of(method, solver, guess, stop, solver_tolerance, max_iterations,
-                                  solver_options, state, integrator, tolerance, step_tolerance, step,
-                                  max_step, threads_of(threads, 1 << 20)));
+                                  solver_options, state, integrator, tolerance, step_tolerance,
+                                  step, max_step, threads_of(threads, 1 << 20)));
           },
           "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto",
           "initial_guess"_a = "cubic", "stop"_a = "energy_norm", "solver_tolerance"_a = nb::none(),
           "max_iterations"_a = nb::none(), "solver_options"_a = nb::none(),
           "state"_a = "joint_rates", "integrator"_a = "adams", "tolerance"_a = 1e-6,
-          "step_tolerance"_a = nb::none(), "step"_a = nb::none(), "max_step"_a = nb::none(), "threads"_a = nb::none())
+          "step_tolerance"_a = nb::none(), "step"_a = nb::none(), "max_step"_a = nb::none(),
+          "threads"_a = nb::none())
       .def("drive_torque", &PySimulation::torque, "joint"_a, "values"_a)
       .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a,
            "interpolation"_a = "linear")
