@@ -10,8 +10,8 @@ from helpers.motion import simulate
 from helpers.random_trees import random_configuration, trees
 
 TOLERANCE = 1e-6
-# N m/rad. A screw falls ever faster, up to 120 turns of a hundred steps in 10 s, and every turn adds
-# to the drift: one free screw in 500 drifts further. On a spring it swings, as hinges do.
+# N m/rad. A screw falls ever faster, up to 120 turns of a hundred steps in 10 s, and each adds to
+# the drift: one free screw in 500 drifts further. On a spring it swings, as hinges do.
 SCREW_SPRING = 1.0
 
 
