@@ -137,7 +137,7 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
   DynamicsMethod* other = nullptr;
   PyModel::Lease scratch(self);
   BatchMethod on_lanes = BatchMethod::articulated_body;
-  if (plain && s.count == 1 && scratch->shared_by_threads()) {
+  if (plain && s.count == 1 && scratch->cut()) {
     const Choice choice =
         method == "auto" ? scratch->default_choice() : Choice{method, "", "as asked for"};
     other = &scratch->method(choice.method, team);

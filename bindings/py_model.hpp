@@ -12,7 +12,6 @@
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
 #include "linkwise/exec/thread_pool.hpp"
-#include "linkwise/kinematics/branches.hpp"
 
 namespace linkwise::bindings {
 
@@ -41,10 +40,10 @@ struct Scratch {
     if (choice_.method.empty()) choice_ = choose_dynamics(*model_, {});
     return choice_;
   }
-  /// Is the model so large that the method of one state keeps pieces or branches for threads?
-  bool shared_by_threads() {
-    if (shared_ < 0) shared_ = default_choice().method == "piecewise" || Branches(*model_).any();
-    return shared_ > 0;
+  /// Does one state have a method of its own, not that of a batch?
+  bool cut() {
+    if (cut_ < 0) cut_ = is_cut(*model_);
+    return cut_ > 0;
   }
   DynamicsMethod& method(const std::string& name, int threads) {
     if (!method_ || method_name_ != name || method_threads_ != threads) {
@@ -62,7 +61,7 @@ struct Scratch {
   std::unique_ptr<DynamicsMethod> method_;
   std::string method_name_;
   Choice choice_;
-  int method_threads_ = 0, shared_ = -1;
+  int method_threads_ = 0, cut_ = -1;
 };
 
 class PyModel {

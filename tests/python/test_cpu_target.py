@@ -109,7 +109,14 @@ def _usable(target):
 
 ROOT = Path(__file__).parents[2]
 OTHERS = [t for t in _core.TARGETS if _usable(t) and t != _core.cpu_target]
-CHECKED = ("test_properties.py", "test_batches.py", "test_threads.py", "test_batch_simulation.py")
+CHECKED = (
+    "python/test_properties.py",
+    "python/test_properties_motion.py",
+    "python/test_batches.py",
+    "python/test_threads.py",
+    "python/test_batch_simulation.py",
+    "crosscheck",
+)
 
 EVALUATE = """
 import sys
@@ -153,8 +160,8 @@ def in_target(target, *command):
 
 @pytest.mark.skipif(not OTHERS, reason="the build has one CPU target for this machine")
 @pytest.mark.parametrize("target", OTHERS)
-def test_the_kernels_tests_hold_for_every_target(target):
-    files = [str(Path(__file__).parent / name) for name in CHECKED]
+def test_the_tests_of_correctness_hold_for_every_target(target):
+    files = [str(ROOT / "tests" / name) for name in CHECKED]
     done = in_target(target, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n0", *files)
     assert done.returncode == 0, done.stdout[-4000:]
     assert " passed" in done.stdout

@@ -15,6 +15,7 @@
 #include "linkwise/kinematics/axis_frames.hpp"
 #include "linkwise/kinematics/body_state.hpp"
 #include "linkwise/kinematics/branches.hpp"
+#include "linkwise/spatial/matrix6.hpp"
 
 namespace linkwise {
 
@@ -26,6 +27,12 @@ class ArticulatedBody {
         body_(model.n_bodies()),
         general_(model.n_general),
         general_body_(model.n_general) {
+    const auto& armature = model.dof_values(DofProperty::armature);
+    for (const BodyTopology& body : model.topology) {
+      if (body.kind != BodyKind::general || !is_free(model, body)) continue;
+      const auto rotors = armature.begin() + body.v;
+      general_body_[body.general].free = std::count(rotors, rotors + 6, 0.0) == 6;
+    }
     bool hinges_only = true;
     for (const Run& run : model.runs) hinges_only &= run.kind == BodyKind::hinge || run.end == 1;
     pose_.resize(hinges_only ? 1 : model.n_bodies());
@@ -34,8 +41,7 @@ class ArticulatedBody {
   /// du [nv]; loads [n_joints][6] or null. Returns false when some D is not positive definite:
   /// `failed_body`.
   bool evaluate(const SweepInput<S>& in, S* du, S* loads) {
-    failed_body_ = -1;
-    if (loads && eliminated_.empty()) eliminated_.resize(model_->n_bodies());
+    start(loads);
     if (branches_ && branches_->any()) {
       evaluate_branches(in, du, loads);
     } else {
@@ -44,9 +50,7 @@ class ArticulatedBody {
       tip_to_base(in, model_->runs, loads);
       base_to_tip(in, model_->runs, du, loads);
     }
-    if (loads)
-      store_joint_loads(
-          *model_, in.q, [&](int n) -> const Force<S>& { return body_[n].U; }, loads);
+    if (loads) store_loads(in, loads);
     return failed_body_ < 0;
   }
 
@@ -59,7 +63,7 @@ class ArticulatedBody {
     if (!branches_->any()) return;
     given_of_.assign(model_->n_bodies(), -1);
     for (const Run& run : branches_->trunk)
-      std::fill(given_of_.begin() + run.begin, given_of_.begin() + run.end, in_trunk);
+      for (int n = run.begin; n < run.end; ++n) only_add(n);
     for (const auto& share : branches_->shares)
       for (const int root : share.roots)
         if (model_->topology[root].parent >= 0) {
@@ -68,9 +72,6 @@ class ArticulatedBody {
         }
   }
 
- private:
-  static constexpr double smallest_pivot = 1e-13;
-  static constexpr int in_trunk = -2;
   struct BodyWork {
     Motion<S> v;              ///< velocity, then acceleration
     Force<S> p;               ///< bias wrench, children's share added tip to base
@@ -78,13 +79,96 @@ class ArticulatedBody {
     Force<S> U;               ///< one-axis joints: Y P; in the end the joint load
     S D_inverse, u, cosine, sine;
   };
+
+  /// The sweeps one by one over some of the bodies, for whoever takes care of the others: their v,
+  /// Y, p and U are then read from here and left here.
+  BodyWork& body(int n) { return body_[n]; }
+  const BodyWork& body(int n) const { return body_[n]; }
+  /// From now on body n adds to its parent's Y, which the caller clears, and never sets it.
+  void only_add(int n) {
+    given_of_.resize(model_->n_bodies(), -1);
+    given_of_[n] = adds;
+  }
+  void start(const S* loads) {
+    failed_body_ = -1;
+    if (loads && eliminated_.empty()) eliminated_.resize(model_->n_bodies());
+  }
+  void calc_velocities(const SweepInput<S>& in, const std::vector<Run>& runs) {
+    const Model& model = *model_;
+    const Motion<S> resting{};
+    for_runs_base_to_tip(runs, [&](auto joint, int begin, int end) {
+      using J = decltype(joint);
+      for (int n = begin; n < end; ++n) {
+        const BodyTopology& body = model.topology[n];
+        const BodyConstants<double>& k = model.constants[n];
+        BodyWork& w = body_[n];
+        const Motion<S>& v_parent = body.parent >= 0 ? body_[body.parent].v : resting;
+        if constexpr (is_general<J>) {
+          GeneralWork& general = general_body_[body.general];
+          if (general.free) {
+            calc_free(in, n, body, v_parent);
+          } else {
+            BodyState<S> state;
+            calc_general_state(model, body, in, v_parent, state, general_[body.general]);
+            pose_[n] = state.X;
+            w.v = state.v;
+            general.c = state.c;
+          }
+        } else {
+          if constexpr (J::is_hinge)
+            sincos(S(in.q[body.q] + k.theta), w.sine, w.cosine);
+          else
+            pose_[n] = J::pose(k.tree, k.pitch, in.q[body.q]);
+          Motion<S> v = seen_at_child<J>(n, v_parent);
+          J::add_rate(v, k.pitch, in.v ? in.v[body.v] : S{});
+          store(w.v, v);
+        }
+        w.p = cross_dual(w.v, k.inertia * w.v);
+      }
+    });
+  }
+
+  void add_external(const SweepInput<S>& in) {
+    if (!in.external) return;
+    for (int j = 0; j < model_->n_joints(); ++j)
+      if (model_->joints[j].last_of_body)
+        body_[model_->joints[j].body].p -= user_wrench(in.external, model_->joints[j], j);
+  }
+  void tip_to_base(const SweepInput<S>& in, const std::vector<Run>& runs, const S* loads) {
+    if (loads)
+      tip_to_base<true>(in, runs);
+    else
+      tip_to_base<false>(in, runs);
+  }
+  void base_to_tip(const SweepInput<S>& in, const std::vector<Run>& runs, S* du, const S* loads) {
+    if (loads)
+      base_to_tip<true>(in, runs, du);
+    else
+      base_to_tip<false>(in, runs, du);
+  }
+  void store_loads(const SweepInput<S>& in, S* loads) const {
+    store_joint_loads(
+        *model_, in.q, [&](int n) -> const Force<S>& { return body_[n].U; }, loads);
+  }
+  /// Of several the outermost is named, whichever thread finds one first.
+  void fail(int n) {
+    int known = failed_body_;
+    while (known < n && !failed_body_.compare_exchange_weak(known, n)) {
+    }
+  }
+
+ private:
+  static constexpr double smallest_pivot = 1e-13;
+  static constexpr int adds = -2;
   /// What the joint load needs: w = Ya x + pa for the parent's acceleration x seen at the body.
   struct Eliminated {
     ArticulatedInertia<S> Y;
     Force<S> p;
   };
   struct GeneralWork {
+    bool free = false;  ///< a floating joint without rotors: P = 1
     Motion<S> c;
+    Motion<S> a;  ///< of a free body: Y^-1 (tau - p), its acceleration
     Force<S> U[6];
     S L[36];  ///< Cholesky factor of D, reciprocal diagonal
     S u[6];
@@ -122,56 +206,6 @@ class ArticulatedBody {
     each([&](const std::vector<Run>& runs) { base_to_tip(in, runs, du, loads); });
   }
 
-  void tip_to_base(const SweepInput<S>& in, const std::vector<Run>& runs, const S* loads) {
-    if (loads)
-      tip_to_base<true>(in, runs);
-    else
-      tip_to_base<false>(in, runs);
-  }
-  void base_to_tip(const SweepInput<S>& in, const std::vector<Run>& runs, S* du, const S* loads) {
-    if (loads)
-      base_to_tip<true>(in, runs, du);
-    else
-      base_to_tip<false>(in, runs, du);
-  }
-
-  void calc_velocities(const SweepInput<S>& in, const std::vector<Run>& runs) {
-    const Model& model = *model_;
-    const Motion<S> resting{};
-    for_runs_base_to_tip(runs, [&](auto joint, int begin, int end) {
-      using J = decltype(joint);
-      for (int n = begin; n < end; ++n) {
-        const BodyTopology& body = model.topology[n];
-        const BodyConstants<double>& k = model.constants[n];
-        BodyWork& w = body_[n];
-        const Motion<S>& v_parent = body.parent >= 0 ? body_[body.parent].v : resting;
-        if constexpr (is_general<J>) {
-          BodyState<S> state;
-          calc_general_state(model, body, in, v_parent, state, general_[body.general]);
-          pose_[n] = state.X;
-          w.v = state.v;
-          general_body_[body.general].c = state.c;
-        } else {
-          if constexpr (J::is_hinge)
-            sincos(S(in.q[body.q] + k.theta), w.sine, w.cosine);
-          else
-            pose_[n] = J::pose(k.tree, k.pitch, in.q[body.q]);
-          Motion<S> v = seen_at_child<J>(n, v_parent);
-          J::add_rate(v, k.pitch, in.v ? in.v[body.v] : S{});
-          store(w.v, v);
-        }
-        w.p = cross_dual(w.v, k.inertia * w.v);
-      }
-    });
-  }
-
-  void add_external(const SweepInput<S>& in) {
-    if (!in.external) return;
-    for (int j = 0; j < model_->n_joints(); ++j)
-      if (model_->joints[j].last_of_body)
-        body_[model_->joints[j].body].p -= user_wrench(in.external, model_->joints[j], j);
-  }
-
   LW_INLINE void give_to_parent(int n, const BodyTopology& body, const ArticulatedInertia<S>& Y,
                                 const Force<S>& p) {
     if (__builtin_expect(!given_of_.empty(), 0)) return give_among_branches(n, body, Y, p);
@@ -191,7 +225,7 @@ class ArticulatedBody {
     }
     BodyWork& parent = body_[body.parent];
     // To a body of the trunk the branches have given before.
-    if (body.first_to_give && given_of_[n] != in_trunk)
+    if (body.first_to_give && given_of_[n] != adds)
       parent.Y = Y;
     else
       parent.Y += Y;
@@ -211,7 +245,10 @@ class ArticulatedBody {
         if (body.n_children > 0) Y = w.Y;
         add_inertia(Y, k.inertia);
         if constexpr (is_general<J>) {
-          eliminate_general<with_loads>(in, n, body, Y);
+          if (general_body_[body.general].free)
+            eliminate_free<with_loads>(in, n, body, Y);
+          else
+            eliminate_general<with_loads>(in, n, body, Y);
         } else {
           const Force<S> U = J::column(Y, k.pitch);
           S D = J::project(U, k.pitch);
@@ -250,31 +287,8 @@ class ArticulatedBody {
   LW_INLINE void eliminate_planar(int n, const BodyTopology& body, const ArticulatedInertia<S>& Y,
                                   const Force<S>& U, const Force<S>& V, const Motion<S>& c, S u) {
     PlanarInertia<S> Z;
-    Z.A = Y.A;
-    Z.A.m[0] -= V.lin.x * U.lin.x;
-    Z.A.m[1] -= V.lin.y * U.lin.x;
-    Z.A.m[2] -= V.lin.y * U.lin.y;
-    Z.A.m[3] -= V.lin.z * U.lin.x;
-    Z.A.m[4] -= V.lin.z * U.lin.y;
-    Z.A.m[5] -= V.lin.z * U.lin.z;
-    Z.B[0] = Y.B.m[0] - V.lin.x * U.ang.x;
-    Z.B[1] = Y.B.m[1] - V.lin.x * U.ang.y;
-    Z.B[2] = Y.B.m[3] - V.lin.y * U.ang.x;
-    Z.B[3] = Y.B.m[4] - V.lin.y * U.ang.y;
-    Z.B[4] = Y.B.m[6] - V.lin.z * U.ang.x;
-    Z.B[5] = Y.B.m[7] - V.lin.z * U.ang.y;
-    Z.xx = Y.C.m[0] - V.ang.x * U.ang.x;
-    Z.xy = Y.C.m[1] - V.ang.y * U.ang.x;
-    Z.yy = Y.C.m[2] - V.ang.y * U.ang.y;
-    // c has no z components, and the moment about z that is left is tau itself.
-    const auto& A = Z.A.m;
     Force<S> p = body_[n].p;
-    p.lin.x += A[0] * c.lin.x + A[1] * c.lin.y + Z.B[0] * c.ang.x + Z.B[1] * c.ang.y + V.lin.x * u;
-    p.lin.y += A[1] * c.lin.x + A[2] * c.lin.y + Z.B[2] * c.ang.x + Z.B[3] * c.ang.y + V.lin.y * u;
-    p.lin.z += A[3] * c.lin.x + A[4] * c.lin.y + Z.B[4] * c.ang.x + Z.B[5] * c.ang.y + V.lin.z * u;
-    p.ang.x += Z.B[0] * c.lin.x + Z.B[2] * c.lin.y + Z.xx * c.ang.x + Z.xy * c.ang.y + V.ang.x * u;
-    p.ang.y += Z.B[1] * c.lin.x + Z.B[3] * c.lin.y + Z.xy * c.ang.x + Z.yy * c.ang.y + V.ang.y * u;
-    p.ang.z += u;
+    eliminate_turn(Y, U, V, c, u, Z, p);
     if constexpr (with_loads) {
       Eliminated& e = eliminated_[n];
       e.Y.A = Z.A;
@@ -300,23 +314,52 @@ class ArticulatedBody {
       if (__builtin_expect(!(lane(D, i) > 0), 0)) fail(n);
   }
 
-  /// Of several the outermost is named, whichever thread finds one first.
-  void fail(int n) {
-    int known = failed_body_;
-    while (known < n && !failed_body_.compare_exchange_weak(known, n)) {
-    }
+  void calc_free(const SweepInput<S>& in, int n, const BodyTopology& body,
+                 const Motion<S>& v_parent) {
+    pose_[n] = element_pose(model_->elements[body.first_element], in.q);
+    Motion<S> v = pose_[n] * v_parent, relative{};
+    if (in.v) relative = to_motion(in.v + body.v);
+    v += relative;
+    general_body_[body.general].c = cross(v, relative);
+    body_[n].v = v;
   }
 
+  /// D = Y, and the parent feels nothing but the joint's own forces.
   template <bool with_loads>
+  void eliminate_free(const SweepInput<S>& in, int n, const BodyTopology& body,
+                      const ArticulatedInertia<S>& Y) {
+    GeneralWork& w = general_body_[body.general];
+    if (!factor(Y, w.L, smallest_pivot)) fail(n);
+    const Force<S> known = to_force(in.tau + body.v);
+    Force<S> f = known;
+    f -= body_[n].p;
+    w.a = solve(w.L, f);
+    if constexpr (with_loads) eliminated_[n] = {{}, known};
+    if (body.parent >= 0) give_to_parent(n, body, {}, transpose_times(pose_[n], known));
+  }
+
+  void accelerate_free(const BodyTopology& body, Motion<S>& a, S* du) {
+    const GeneralWork& w = general_body_[body.general];
+    a += w.c;
+    const Vector6<S> carried = to_array(a), whole = to_array(w.a);
+    for (int i = 0; i < 6; ++i) du[body.v + i] = whole[i] - carried[i];
+    a = w.a;
+  }
+
+  /// The loops over a joint's degrees of freedom are unrolled for each number of them.
+  template <bool with_loads, int dofs = 6>
   void eliminate_general(const SweepInput<S>& in, int n, const BodyTopology& body,
                          ArticulatedInertia<S>& Y) {
     const GeneralState<S>& g = general_[body.general];
+    if constexpr (dofs > 0)
+      if (g.n < dofs) return eliminate_general<with_loads, dofs - 1>(in, n, body, Y);
     GeneralWork& w = general_body_[body.general];
     Force<S> p = body_[n].p;
     const auto& armature = model_->dof_values(DofProperty::armature);
-    for (int i = 0; i < g.n; ++i) w.U[i] = Y * g.P[i];
+#pragma GCC unroll 6
+    for (int i = 0; i < dofs; ++i) w.U[i] = Y * g.P[i];
     // Cholesky of D = P^T U + armature, rows of L with the reciprocal diagonal.
-    for (int i = 0; i < g.n; ++i) {
+    for (int i = 0; i < dofs; ++i) {
       for (int j = 0; j <= i; ++j) {
         S d = dot(g.P[i], w.U[j]);
         if (i == j) d = d + armature[g.dof[i]];
@@ -336,7 +379,7 @@ class ArticulatedBody {
     // W = U L^-T, so that U D^-1 U^T = W W^T and U D^-1 u = W (L^-1 u).
     Force<S> W[6];
     S z[6];
-    for (int i = 0; i < g.n; ++i) {
+    for (int i = 0; i < dofs; ++i) {
       Force<S> column = w.U[i];
       S y = w.u[i];
       for (int l = 0; l < i; ++l) {
@@ -349,7 +392,7 @@ class ArticulatedBody {
       subtract_outer(Y, W[i], W[i]);
     }
     p += Y * w.c;
-    for (int i = 0; i < g.n; ++i) p += Force<S>{z[i] * W[i].lin, z[i] * W[i].ang};
+    for (int i = 0; i < dofs; ++i) p += Force<S>{z[i] * W[i].lin, z[i] * W[i].ang};
     if constexpr (with_loads) eliminated_[n] = {Y, p};
     if (body.parent >= 0)
       give_to_parent(n, body, transform_to_parent(pose_[n], Y), transpose_times(pose_[n], p));
@@ -369,8 +412,13 @@ class ArticulatedBody {
         if constexpr (is_general<J>) {
           Motion<S> a = pose_[n] * a_parent;
           if constexpr (with_loads) w.U = load(n, a);
-          a += general_body_[body.general].c;
-          accelerate_general(in, body, a, du);
+          const GeneralWork& general = general_body_[body.general];
+          if (general.free) {
+            accelerate_free(body, a, du);
+          } else {
+            a += general.c;
+            accelerate_general(in, body, a, du);
+          }
           w.v = a;
         } else {
           Motion<S> a = seen_at_child<J>(n, a_parent);
@@ -441,7 +489,7 @@ class ArticulatedBody {
   std::atomic<int> failed_body_ = -1;
   std::unique_ptr<Branches> branches_;  ///< made where threads may share them
   int threads_ = 1;
-  std::vector<int> given_of_;      ///< root of a branch -> index into given_; in_trunk; else -1
+  std::vector<int> given_of_;      ///< root of a branch -> index into given_; or adds; else -1
   std::vector<Eliminated> given_;  ///< to the trunk
 };
 

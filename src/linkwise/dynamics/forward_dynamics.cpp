@@ -1,7 +1,7 @@
 #include "linkwise/dynamics/forward_dynamics.hpp"
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/dynamics/articulated_body.hpp"
+#include "linkwise/dynamics/articulated_paths.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/constraint_elimination.hpp"
 #include "linkwise/dynamics/constraint_force.hpp"
@@ -18,7 +18,8 @@ namespace {
 template <class Kernel>
 class Recursion : public DynamicsMethod {
  public:
-  explicit Recursion(const Model& model) : kernel_(model) {}
+  template <class... Options>
+  explicit Recursion(const Model& model, Options... options) : kernel_(model, options...) {}
   DynamicsReport evaluate(double, const SweepInput<double>& in, double* du,
                           double* loads) override {
     DynamicsReport report;
@@ -70,8 +71,11 @@ class FusedConstraintForce : public DynamicsMethod {
 
 std::unique_ptr<DynamicsMethod> make_articulated_body(const Model& model,
                                                       const DynamicsOptions& options) {
+  const int threads = checked_threads(options.threads);
+  if (paths_fill(model, native_lanes))
+    return std::make_unique<Recursion<ArticulatedPaths<Lanes<native_lanes>>>>(model, threads);
   auto method = std::make_unique<Recursion<ArticulatedBody<double>>>(model);
-  method->kernel().share_branches(checked_threads(options.threads));
+  method->kernel().share_branches(threads);
   return method;
 }
 
@@ -137,6 +141,8 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
       choice.reason = model.singular_body() >= 0
                           ? "body '" + model.body_name(model.singular_body()) +
                                 "' has a singular inertia, which only the recursion takes"
+                      : paths_fill(model, native_lanes)
+                          ? "the recursion, with the paths of the tree side by side in SIMD lanes"
                           : "the recursion is the fastest and the most accurate on one system";
     }
   }
@@ -146,6 +152,11 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
   else if (choice.solver == "auto")
     choice.solver = "thomas";
   return choice;
+}
+
+bool is_cut(const Model& model) {
+  return choose_dynamics(model, {}).method == "piecewise" || paths_fill(model, native_lanes) ||
+         Branches(model).any();
 }
 
 std::unique_ptr<DynamicsMethod> make_dynamics(const Model& model, const DynamicsOptions& options) {

@@ -59,6 +59,9 @@ struct Choice {
 };
 Choice choose_dynamics(const Model& model, const DynamicsOptions& options);
 
+/// Does "auto" cut one system of this model into pieces, paths or branches, for lanes or threads?
+bool is_cut(const Model& model);
+
 /// Resolves "auto" and makes the method.
 std::unique_ptr<DynamicsMethod> make_dynamics(const Model& model, const DynamicsOptions& options);
 

@@ -3,7 +3,6 @@
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/piece_kernels.hpp"
 #include "linkwise/exec/thread_pool.hpp"
-#include "linkwise/kinematics/axis_frames.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
@@ -16,23 +15,6 @@ constexpr int fewest_for_threads = 128;
 
 int threads_for(int n_bodies, int threads) { return n_bodies < fewest_for_threads ? 1 : threads; }
 
-template <class A, class B>
-void set_lanes(A& to, int l, const B& from) {
-  static_assert(sizeof(A) == sizeof(B) * native_lanes);
-  const auto* source = reinterpret_cast<const double*>(&from);
-  auto* target = reinterpret_cast<Group*>(&to);
-  for (size_t i = 0; i < sizeof(B) / sizeof(double); ++i) target[i][l] = source[i];
-}
-template <class B, class A>
-B get_lanes(const A& from, int l) {
-  static_assert(sizeof(A) == sizeof(B) * native_lanes);
-  B to;
-  const auto* source = reinterpret_cast<const Group*>(&from);
-  auto* target = reinterpret_cast<double*>(&to);
-  for (size_t i = 0; i < sizeof(B) / sizeof(double); ++i) target[i] = source[i][l];
-  return to;
-}
-
 }  // namespace
 
 class PiecewiseChain {
@@ -43,7 +25,6 @@ class PiecewiseChain {
         n_(model.n_bodies()),
         n_pieces_(Piecewise::pieces(n_)),
         length_((n_ + n_pieces_ - 1) / n_pieces_),
-        groups_((n_pieces_ + native_lanes - 1) / native_lanes),
         pose_(n_pieces_),
         bias_(n_pieces_),
         solver_(make_solver(
@@ -54,22 +35,22 @@ class PiecewiseChain {
     A_.set_structure(parent, dim);
     b_.resize(A_.size());
     f_.resize(A_.size());
-    for (PieceGroup<Group>& group : groups_) {
-      group.body.resize(length_);
-      group.state.resize(length_);
-    }
-    for (size_t g = 0; g < groups_.size(); ++g)
+    for (int g = 0; g < (n_pieces_ + native_lanes - 1) / native_lanes; ++g) {
+      groups_.emplace_back(
+          LaneBodies<Group>(model, length_, [&](int k, int l) { return body_at(g, l, k); }));
+      // The first body of a piece of stand-ins must have an inertia to invert; nothing feels it.
       for (int l = 0; l < native_lanes; ++l)
-        for (int k = 0; k < length_; ++k) set_body(g, l, k);
-    for (size_t g = 0; g < groups_.size(); ++g)
-      for (int k = 1; k < length_; ++k) set_skew(static_cast<int>(g), k);
+        if (body_at(g, l, 0) >= n_)
+          set_lanes<Group>(groups_.back().body[0].inertia, l,
+                           Inertia<double>{1, {}, {{1, 0, 1, 0, 0, 1}}});
+    }
   }
 
   DynamicsReport evaluate(const SweepInput<double>& in, double* du, double* loads) {
     in_ = &in;
     parallel_for(n_groups(), threads_, [&](int g) {
-      groups_[g].across([&](size_t k) { return gather(in.q, g, k); },
-                        [&](size_t k) { return in.v ? gather(in.v, g, k) : Group{}; });
+      groups_[g].across([&](int k) { return gather(in.q, g, k); },
+                        [&](int k) { return in.v ? gather(in.v, g, k) : Group{}; });
     });
     scan_velocities();
     parallel_for(n_groups(), threads_, [&](int g) {
@@ -89,9 +70,9 @@ class PiecewiseChain {
     spread_forces();
     parallel_for(n_groups(), threads_, [&](int g) {
       groups_[g].base_to_tip(
-          [&](size_t k, Group rate) {
+          [&](int k, Group rate) {
             for (int l = 0; l < native_lanes; ++l)
-              if (const int n = body_at(g, l, static_cast<int>(k)); n < n_) du[n] = rate[l];
+              if (const int n = body_at(g, l, k); n < n_) du[n] = rate[l];
           },
           loads != nullptr);
       if (loads) store_loads(g, loads);
@@ -108,52 +89,12 @@ class PiecewiseChain {
   int body_at(int g, int l, int k) const { return (g * native_lanes + l) * length_ + k; }
   PieceEnds<Group>& ends(int piece) { return groups_[piece / native_lanes].ends; }
 
-  void set_body(size_t g, int l, int k) {
-    PieceBody<Group>& to = groups_[g].body[k];
-    const int n = body_at(static_cast<int>(g), l, k);
-    if (n >= n_) {  // a massless stand-in: turns with nothing, weighs nothing
-      set_lanes(to.placement, l, HingePlacement<double>{1, 0, 0, 0});
-      to.theta[l] = 0;
-      set_lanes(to.inertia, l, Inertia<double>{});
-      // As the first body of a piece it must have an inertia to invert; nothing feels it.
-      if (k == 0) set_lanes(to.inertia, l, Inertia<double>{1, {}, {{1, 0, 1, 0, 0, 1}}});
-      to.stand_in[l] = 1;
-      return;
-    }
-    const BodyConstants<double>& c = model_.constants[n];
-    set_lanes(to.placement, l, placement(c));
-    to.theta[l] = c.theta;
-    set_lanes(to.inertia, l, c.inertia);
-    to.stand_in[l] = 0;
-  }
-
-  /// Where any lane's joint is no hinge the whole position takes full placements, theta included.
-  void set_skew(int g, int k) {
-    PieceGroup<Group>& group = groups_[g];
-    bool skew = false;
-    for (int l = 0; l < native_lanes; ++l) {
-      const int n = body_at(g, l, k);
-      skew |= n < n_ && model_.topology[n].kind != BodyKind::hinge;
-    }
-    if (!skew) return;
-    group.body[k].skew = static_cast<int>(group.skew.size());
-    Transform<Group> placements;
-    for (int l = 0; l < native_lanes; ++l) {
-      const int n = body_at(g, l, k);
-      set_lanes(
-          placements, l,
-          n < n_ ? model_.constants[n].tree : Transform<double>{Mat3<double>::identity(), {}});
-      group.body[k].theta[l] = 0;
-    }
-    group.skew.push_back(placements);
-  }
-
   /// values[body] at position k of each piece; bodies and coordinates of a chain are numbered
   /// alike.
-  Group gather(const double* values, int g, size_t k) const {
+  Group gather(const double* values, int g, int k) const {
     Group out{};
     for (int l = 0; l < native_lanes; ++l)
-      if (const int n = body_at(g, l, static_cast<int>(k)); n < n_) out[l] = values[n];
+      if (const int n = body_at(g, l, k); n < n_) out[l] = values[n];
     return out;
   }
 
@@ -163,9 +104,9 @@ class PiecewiseChain {
       for (int k = 0; k < length_; ++k) {
         const int n = body_at(g, l, k);
         if (n >= n_) return;
-        Force<double> p = get_lanes<Force<double>>(groups_[g].state[k].p, l);
+        Force<double> p = get_lanes<Force<double>, Group>(groups_[g].state[k].p, l);
         p -= user_wrench(in_->external, model_.joints[n], n);
-        set_lanes(groups_[g].state[k].p, l, p);
+        set_lanes<Group>(groups_[g].state[k].p, l, p);
       }
   }
 
@@ -176,9 +117,9 @@ class PiecewiseChain {
       const int n = first(s), l = s % native_lanes;
       PieceEnds<Group>& e = ends(s);
       if (n >= n_) {
-        set_lanes(e.v_first, l, Motion<double>{});
-        for (auto& column : e.cut_columns) set_lanes(column, l, Motion<double>{});
-        set_lanes(e.known_outboard, l, Force<double>{});
+        set_lanes<Group>(e.v_first, l, Motion<double>{});
+        for (auto& column : e.cut_columns) set_lanes<Group>(column, l, Motion<double>{});
+        set_lanes<Group>(e.known_outboard, l, Force<double>{});
         e.first_torque[l] = 0;
         pose_[s] = {Mat3<double>::identity(), {}};
         bias_[s] = {};
@@ -191,11 +132,11 @@ class PiecewiseChain {
       Motion<double> v = pose_[s] * v_last;
       v.ang.z += u;
       bias_[s] = RevoluteJoint::bias(v, 0.0, u);
-      set_lanes(e.v_first, l, v);
+      set_lanes<Group>(e.v_first, l, v);
       e.first_torque[l] = tau;
       if (s > 0) set_outboard(s - 1, pose_[s], tau);
-      v_last = get_lanes<Transform<double>>(e.across, l) * v;
-      v_last += get_lanes<Motion<double>>(e.relative, l);
+      v_last = get_lanes<Transform<double>, Group>(e.across, l) * v;
+      v_last += get_lanes<Motion<double>, Group>(e.relative, l);
     }
     clear_outboard(n_pieces_ - 1);
   }
@@ -207,14 +148,15 @@ class PiecewiseChain {
       double unit[6] = {};
       unit[j] = 1;
       const Force<double> w = transpose_times(X, to_force(unit));
-      set_lanes(e.cut_columns[j], s % native_lanes, Motion<double>{w.lin, w.ang});
+      set_lanes<Group>(e.cut_columns[j], s % native_lanes, Motion<double>{w.lin, w.ang});
     }
     const Force<double> w = transpose_times(X, Force<double>{{}, {0, 0, tau}});
-    set_lanes(e.known_outboard, s % native_lanes, Force<double>{-w.lin, -w.ang});
+    set_lanes<Group>(e.known_outboard, s % native_lanes, Force<double>{-w.lin, -w.ang});
   }
   void clear_outboard(int s) {
-    for (auto& column : ends(s).cut_columns) set_lanes(column, s % native_lanes, Motion<double>{});
-    set_lanes(ends(s).known_outboard, s % native_lanes, Force<double>{});
+    for (auto& column : ends(s).cut_columns)
+      set_lanes<Group>(column, s % native_lanes, Motion<double>{});
+    set_lanes<Group>(ends(s).known_outboard, s % native_lanes, Force<double>{});
   }
 
   void assemble() {
@@ -222,7 +164,7 @@ class PiecewiseChain {
     for (int s = 0; s < n_pieces_; ++s) {
       const PieceEnds<Group>& e = ends(s);
       const int l = s % native_lanes;
-      const Motion<double> free = get_lanes<Motion<double>>(e.a_free, l);
+      const Motion<double> free = get_lanes<Motion<double>, Group>(e.a_free, l);
       const Motion<double> from_ground = pose_[s] * ground;
       const PieceEnds<Group>* in = s > 0 ? &ends(s - 1) : nullptr;
       const int li = (s + native_lanes - 1) % native_lanes;
@@ -252,9 +194,9 @@ class PiecewiseChain {
     Motion<double> a = ground_acceleration<double>(model_, in_->gravity_factor);
     for (int s = 0; s < n_pieces_ && first(s) < n_; ++s) {
       const int l = s % native_lanes;
-      du[first(s)] = get_lanes<Motion<double>>(ends(s).a_first, l).ang.z - (pose_[s] * a).ang.z -
-                     bias_[s].ang.z;
-      a = get_lanes<Motion<double>>(ends(s).a_last, l);
+      du[first(s)] = get_lanes<Motion<double>, Group>(ends(s).a_first, l).ang.z -
+                     (pose_[s] * a).ang.z - bias_[s].ang.z;
+      a = get_lanes<Motion<double>, Group>(ends(s).a_last, l);
     }
   }
 
@@ -263,8 +205,8 @@ class PiecewiseChain {
       for (int k = 0; k < length_; ++k) {
         const int n = body_at(g, l, k);  // and the number of its joint
         if (n >= n_) return;
-        store_joint_load(model_, n, in_->q, get_lanes<Force<double>>(groups_[g].state[k].U, l),
-                         loads + 6 * n);
+        store_joint_load(model_, n, in_->q,
+                         get_lanes<Force<double>, Group>(groups_[g].state[k].U, l), loads + 6 * n);
       }
   }
 

@@ -78,6 +78,12 @@ LW_INLINE void for_runs_tip_to_base(const Model& model, F&& f) {
 template <class J>
 inline constexpr bool is_general = std::is_same_v<J, GeneralJoint>;
 
+/// One floating joint, P = 1.
+inline bool is_free(const Model& model, const BodyTopology& body) {
+  const Element& e = model.elements[body.first_element];
+  return body.n_elements == 1 && e.kind == ElementKind::floating && !e.prescribed;
+}
+
 template <class S>
 void calc_general_state(const Model& model, const BodyTopology& body, const SweepInput<S>& in,
                         const Motion<S>& v_parent, BodyState<S>& state, GeneralState<S>& general) {

@@ -9,13 +9,6 @@ namespace {
 constexpr int fewest_in_a_share = 128;
 constexpr int most_shares = 64;
 
-void append(std::vector<Run>& runs, BodyKind kind, int n) {
-  if (!runs.empty() && runs.back().end == n && runs.back().kind == kind)
-    ++runs.back().end;
-  else
-    runs.push_back({kind, n, n + 1});
-}
-
 }  // namespace
 
 Branches::Branches(const Model& model) {
@@ -34,7 +27,7 @@ Branches::Branches(const Model& model) {
   for (int n = 0; n < n_bodies; ++n) {
     const BodyTopology& body = model.topology[n];
     if (size[n] > limit) {
-      append(trunk, body.kind, n);
+      append_body(trunk, body.kind, n);
       continue;
     }
     const int inboard = body.parent >= 0 ? share_of[body.parent] : -1;
@@ -49,7 +42,7 @@ Branches::Branches(const Model& model) {
       share_of[n] = static_cast<int>(shares.size()) - 1;
       shares.back().roots.push_back(n);
     }
-    append(shares[share_of[n]].runs, body.kind, n);
+    append_body(shares[share_of[n]].runs, body.kind, n);
   }
 }
 

@@ -49,6 +49,14 @@ struct Run {
   int begin, end;
 };
 
+/// Body n, the next one of its kind or the first of a new run.
+inline void append_body(std::vector<Run>& runs, BodyKind kind, int n) {
+  if (!runs.empty() && runs.back().end == n && runs.back().kind == kind)
+    ++runs.back().end;
+  else
+    runs.push_back({kind, n, n + 1});
+}
+
 struct JointInfo {
   std::string name;
   JointType type;

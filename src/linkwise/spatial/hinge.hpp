@@ -87,6 +87,36 @@ LW_INLINE Force<S> to_parent(const HingePlacement<C>& k, S c, S s, Force<S> f) {
   return to_parent(k, f);
 }
 
+/// Eliminates a revolute joint without rotor, with U = Y P, V = U / D: Z = Y - V U^T and
+/// p + Z c + V u. c has no z components, and the moment about z that is left is the joint's torque.
+template <class S>
+LW_INLINE void eliminate_turn(const ArticulatedInertia<S>& Y, const Force<S>& U, const Force<S>& V,
+                              const Motion<S>& c, S u, PlanarInertia<S>& Z, Force<S>& p) {
+  Z.A = Y.A;
+  Z.A.m[0] -= V.lin.x * U.lin.x;
+  Z.A.m[1] -= V.lin.y * U.lin.x;
+  Z.A.m[2] -= V.lin.y * U.lin.y;
+  Z.A.m[3] -= V.lin.z * U.lin.x;
+  Z.A.m[4] -= V.lin.z * U.lin.y;
+  Z.A.m[5] -= V.lin.z * U.lin.z;
+  Z.B[0] = Y.B.m[0] - V.lin.x * U.ang.x;
+  Z.B[1] = Y.B.m[1] - V.lin.x * U.ang.y;
+  Z.B[2] = Y.B.m[3] - V.lin.y * U.ang.x;
+  Z.B[3] = Y.B.m[4] - V.lin.y * U.ang.y;
+  Z.B[4] = Y.B.m[6] - V.lin.z * U.ang.x;
+  Z.B[5] = Y.B.m[7] - V.lin.z * U.ang.y;
+  Z.xx = Y.C.m[0] - V.ang.x * U.ang.x;
+  Z.xy = Y.C.m[1] - V.ang.y * U.ang.x;
+  Z.yy = Y.C.m[2] - V.ang.y * U.ang.y;
+  const auto& A = Z.A.m;
+  p.lin.x += A[0] * c.lin.x + A[1] * c.lin.y + Z.B[0] * c.ang.x + Z.B[1] * c.ang.y + V.lin.x * u;
+  p.lin.y += A[1] * c.lin.x + A[2] * c.lin.y + Z.B[2] * c.ang.x + Z.B[3] * c.ang.y + V.lin.y * u;
+  p.lin.z += A[3] * c.lin.x + A[4] * c.lin.y + Z.B[4] * c.ang.x + Z.B[5] * c.ang.y + V.lin.z * u;
+  p.ang.x += Z.B[0] * c.lin.x + Z.B[2] * c.lin.y + Z.xx * c.ang.x + Z.xy * c.ang.y + V.ang.x * u;
+  p.ang.y += Z.B[1] * c.lin.x + Z.B[3] * c.lin.y + Z.xy * c.ang.x + Z.yy * c.ang.y + V.ang.y * u;
+  p.ang.z += u;
+}
+
 /// X^T Y X.
 template <class C, class S>
 LW_INLINE ArticulatedInertia<S> to_parent(const HingePlacement<C>& k, S c, S s,

@@ -30,6 +30,47 @@ LW_INLINE Force<S> to_force(const S* v) {
   return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
 }
 
+/// Cholesky factor of Y, packed rows with the reciprocal diagonal. False where in some lane a pivot
+/// is not above this part of its diagonal entry.
+template <class S>
+bool factor(const ArticulatedInertia<S>& Y, S* L, double smallest_pivot = 0) {
+  const auto entry = [&](int i, int j) -> S {
+    return i < 3   ? Y.A.m[sym_index(i, j)]
+           : j < 3 ? Y.B.m[3 * j + i - 3]
+                   : Y.C.m[sym_index(i - 3, j - 3)];
+  };
+  bool ok = true;
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j <= i; ++j) {
+      const S whole = entry(i, j);
+      S x = whole;
+      for (int l = 0; l < j; ++l) x = x - L[sym_index(i, l)] * L[sym_index(j, l)];
+      if (i == j) {
+        for (int l = 0; l < lane_count<S>; ++l)
+          ok &= lane(x, l) - smallest_pivot * lane(whole, l) > 0;
+        L[sym_index(i, i)] = 1.0 / square_root(x);
+      } else {
+        L[sym_index(i, j)] = x * L[sym_index(j, j)];
+      }
+    }
+  return ok;
+}
+
+/// Y^-1 f with that factor.
+template <class S>
+Motion<S> solve(const S* L, const Force<S>& f) {
+  S x[6] = {f.lin.x, f.lin.y, f.lin.z, f.ang.x, f.ang.y, f.ang.z};
+  for (int i = 0; i < 6; ++i) {
+    for (int l = 0; l < i; ++l) x[i] = x[i] - L[sym_index(i, l)] * x[l];
+    x[i] = x[i] * L[sym_index(i, i)];
+  }
+  for (int i = 5; i >= 0; --i) {
+    for (int l = i + 1; l < 6; ++l) x[i] = x[i] - L[sym_index(l, i)] * x[l];
+    x[i] = x[i] * L[sym_index(i, i)];
+  }
+  return to_motion(x);
+}
+
 /// Inverse of a body's 6x6 inertia: [1/m - c~ Ic^-1 c~, c~ Ic^-1; ., Ic^-1], so that a = M^-1 w.
 /// Stored as the symmetric [A B; B^T C]; multiply() takes a wrench to an acceleration.
 template <class T>
