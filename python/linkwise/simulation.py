@@ -16,7 +16,7 @@ from linkwise import _core
 from linkwise._core import InputError
 from linkwise.arguments import number, optional_count, optional_number, sample_times, state_vector
 from linkwise.drives import Motion, as_drive, as_wrench
-from linkwise.io.complaint import near
+from linkwise.io.complaint import near, shorten
 from linkwise.record.claim import check_target
 from linkwise.record.memory import MemoryRecord
 from linkwise.record.provenance import describe, provenance
@@ -310,4 +310,9 @@ def run_scenario(
     arguments = loaded.simulate_arguments(model)
     if output is not None:
         arguments["output"] = output
-    return simulate(model, **arguments, progress=progress, on_failure=on_failure)
+    if arguments["output"] is not None:
+        check_target(arguments["output"])
+    try:
+        return simulate(model, **arguments, progress=progress, on_failure=on_failure)
+    except InputError as error:
+        raise InputError(f"{shorten(loaded.path, 400)}: {error}") from None

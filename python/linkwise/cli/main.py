@@ -101,7 +101,8 @@ def _exit_code() -> int:
             raise
         if os.environ.get("LINKWISE_TRACEBACK"):
             raise
-        return _complain(f"{type(error).__name__}: {error}", FAILED)
+        known = isinstance(error, (OSError, MemoryError)) and str(error)
+        return _complain(str(error) if known else f"{type(error).__name__}: {error}", FAILED)
     return result if isinstance(result, int) else DONE
 
 

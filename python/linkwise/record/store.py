@@ -100,9 +100,14 @@ class RunWriter:
             if model is not None:
                 write_model(aside, model)
             _move_into_place(aside, self.path)
-        except BaseException:
+        except BaseException as error:
             release(self._lock)
             shutil.rmtree(aside, ignore_errors=True)
+            if isinstance(error, OSError):
+                raise OSError(
+                    f"output {str(path)!r}: cannot be written ({error.strerror}); make room or "
+                    "choose another path"
+                ) from error
             raise
         self._group = zarr.open_group(self.path, mode="r+", zarr_format=3, use_consolidated=False)
         names = ["time", *(variable.name for variable in schema.variables)]
@@ -171,9 +176,15 @@ class RunWriter:
         times, rows = self._take(count)
         self._waiting -= count
         where = slice(self._written, self._written + count)
-        for name, values in rows.items():
-            self._arrays[name][where] = values
-        self._arrays["time"][where] = times  # last: it says that the others are complete
+        try:
+            for name, values in rows.items():
+                self._arrays[name][where] = values
+            self._arrays["time"][where] = times  # last: it says that the others are complete
+        except OSError as error:
+            raise OSError(
+                f"output {str(self.path)!r}: cannot be written further ({error.strerror}); make "
+                f"room or choose another path (the {self._written} samples there are complete)"
+            ) from error
         self._written += count
         self._flushed = clock.monotonic()
 

@@ -1,8 +1,11 @@
 """Wrong input: one line on stderr, exit code 2, nothing written."""
 
 import os
+import resource
 
 import pytest
+
+from linkwise import open_run
 
 
 def refuse(result, *parts):
@@ -60,6 +63,13 @@ def test_error_of_a_model_names_the_element(linkwise, arm):
         ("position.elbow", "position.elbwo", ["elbwo"]),
         ("[drive.slide]", "[drive.slode]", ["slode"]),
         ("every = 0.01", 'every = 0.01\nquantities = ["loads"]', ["loads"]),
+        ("duration = 0.5", "duration = 0.5\nthreads = 5000", ["swing.toml: threads is 5000"]),
+        (
+            "duration = 0.5",
+            'duration = 0.5\nintegrator = "runge_kutta_4"',
+            ["swing.toml: ", "runge_kutta_4 needs a fixed step"],
+        ),
+        ("every = 0.01", "every = 1e-12", ["swing.toml: every: 1e-12 s makes 5e+11 samples"]),
         ('model = "arm.urdf"', 'model = "leg.urdf"', ["leg.urdf"]),
         ('kind = "locked"', 'kind = "torque"\ntable = "t.csv"', ["t.csv"]),
         ("[simulate]", "[simulate", ["swing.toml"]),
@@ -82,6 +92,32 @@ def test_output_that_is_something_else(linkwise, scenario, output):
         file.write("precious")
     refuse(linkwise("run", scenario(), "-o", output), output, "is not a linkwise run")
     assert os.listdir("results") == ["thesis.tex"]
+
+
+@pytest.fixture
+def largest_file():
+    """Files may not grow beyond a size, as on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize(
+    ("size", "said", "left"),
+    [
+        (100, "cannot be written (File too large)", False),
+        (20_000, "cannot be written further (File too large)", True),
+    ],
+)
+def test_disk_that_is_full(linkwise, scenario, largest_file, size, said, left):
+    path = scenario(("every = 0.01", "every = 0.0005"))
+    largest_file(size)
+    result = linkwise("run", path, "-o", "run.zarr")
+    assert result.code == 1
+    assert f"output 'run.zarr': {said}; make room or choose another path" in result.complaint
+    assert os.path.exists("run.zarr") == left
+    if left:
+        assert open_run("run.zarr").sizes["time"] == 0
 
 
 def test_json_of_a_complaint(linkwise):
