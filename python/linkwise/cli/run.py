@@ -78,9 +78,12 @@ def _solver(name: str) -> str:
 
 def show_run(run: Run, as_json: bool) -> None:
     """How the run went, the peak loads, and where the results are."""
+    from linkwise.cli.limits import beyond_limits, limit_note
+
     peaks = peak_records(run) if has_loads(run) else []
+    beyond = beyond_limits(run) if run.dataset.sizes["time"] else []
     if as_json:
-        print_json({**summary(run), "peak_loads": peaks})
+        print_json({**summary(run), "peak_loads": peaks, "beyond_limits": beyond})
         return
     attrs = run.dataset.attrs
     screen = console()
@@ -92,4 +95,6 @@ def show_run(run: Run, as_json: bool) -> None:
         f"by {attrs['method']}{_solver(attrs['solver'])}.",
         markup=False,
     )
+    if beyond:
+        screen.print(limit_note(beyond), markup=False)
     screen.print(f"Results: {run.path}", markup=False)

@@ -7,6 +7,7 @@ import pytest
 
 import linkwise as lw
 from linkwise.cli import demo
+from linkwise.cli.limits import beyond_limits
 from linkwise.cli.progress import describe
 from linkwise.time_loop import Progress
 
@@ -129,6 +130,41 @@ def test_run_writes_results_named_like_the_scenario(linkwise, scenario):
     assert float(run.position.sel(joint="elbow")[0]) == 0.3
     assert np.all(run.velocity.sel(joint="slide") == 0)
     assert linkwise("run", scenario(), "--json").json["run"] == "swing-2.zarr"
+
+
+FREE = (('kind = "locked"', 'kind = "free"'), ("duration = 0.5", "duration = 2"))
+
+
+def test_run_names_joints_that_leave_their_limits(linkwise, scenario):
+    result = linkwise("run", scenario(*FREE), "--json")
+    run = lw.open_run("swing.zarr")
+    assert abs(run.position.sel(joint="elbow")).max() < 1.5
+    q = run.position.sel(joint="slide").values
+    row = {"joint": "slide", "lower": 0.0, "upper": 0.2, "farthest": float(q.min())}
+    row["since"] = float(run.time.values[np.argmax(q < 0)])
+    assert result.json["beyond_limits"] == [row]
+    said = linkwise("run", scenario(*FREE), "-o", "again.zarr").out
+    assert "Beyond their limits, which exert no force: slide (0 .. 0.2) gets to -17" in said
+    assert "Beyond" not in linkwise("run", scenario(), "-o", "within.zarr").out
+
+
+def test_limits_with_stops_are_not_left():
+    builder = lw.ModelBuilder("fall", gravity=(0, 0, -9.81))
+    builder.add_link("ground")
+    for name, stiffness in (("stopped", 1e4), ("free", 0.0)):
+        builder.add_link(name + "_body", mass=1.0, inertia=np.eye(3))
+        builder.add_joint(
+            name,
+            "prismatic",
+            "ground",
+            name + "_body",
+            axis=(0, 0, 1),
+            lower=-0.1,
+            upper=0.1,
+            limit_stiffness=stiffness,
+        )
+    run = lw.simulate(builder.build(), duration=1.0, every=0.01)
+    assert [row["joint"] for row in beyond_limits(run)] == ["free"]
 
 
 def test_run_output_named_by_hand_is_replaced(linkwise, scenario):

@@ -1,0 +1,84 @@
+"""Joints that left their position limits in a run: without stops, limits exert no force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise.cli.output import number
+from linkwise.loads.samples import blocks, rows
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from linkwise._core import Model
+    from linkwise.result import Run
+
+_SHOWN = 4
+
+
+def _limited(run: Run, model: Model) -> list[tuple[str, int, float, float]]:
+    """Joint, column of the positions, lower and upper limit, where one is finite without a stop."""
+    names = run.dataset["joint"].values.tolist() if "joint" in run.dataset else model.joint_names
+    sizes = dict(zip(model.joint_names, model.joint_nq, strict=True))
+    free = model.limit_stiffness == 0
+    low, high = model.lower_limit, model.upper_limit
+    found, first = [], 0
+    for name in names:
+        dofs = range(model.nv)[model.v_slice(name)]
+        if len(dofs) == sizes[name]:  # quaternions have no limits
+            found += [
+                (name, first + k, float(low[dof]), float(high[dof]))
+                for k, dof in enumerate(dofs)
+                if free[dof] and np.isfinite([low[dof], high[dof]]).any()
+            ]
+        first += sizes[name]
+    # Of joints that the run does not name, nothing is known.
+    return found if first == run.dataset["position"].shape[1] else []
+
+
+def beyond_limits(run: Run) -> list[dict[str, Any]]:
+    """Per joint beyond a limit: since when [s], and its farthest position there."""
+    limited = _limited(run, run.load_model()) if "position" in run.dataset else []
+    if not limited:
+        return []
+    columns = [column for _, column, _, _ in limited]
+    lower, upper = np.array([row[2:] for row in limited]).T
+    since, farthest = np.full((2, len(limited)), np.nan)
+    worst = np.zeros(len(limited))
+    times: npt.NDArray[np.float64] = run.dataset["time"].values
+    for where in blocks(run, 8 * run.dataset["position"].shape[1]):
+        q = rows(run, "position", where)[:, columns]
+        past = np.maximum(lower - q, q - upper)
+        first_time = times[where][(past > 0).argmax(axis=0)]
+        since = np.where(np.isnan(since) & (past > 0).any(axis=0), first_time, since)
+        at = past.argmax(axis=0), np.arange(len(limited))
+        farther = past[at] > worst
+        farthest[farther], worst[farther] = q[at][farther], past[at][farther]
+    return [
+        {
+            "joint": limited[k][0],
+            "lower": float(lower[k]),
+            "upper": float(upper[k]),
+            "since": float(since[k]),
+            "farthest": float(farthest[k]),
+        }
+        for k in np.flatnonzero(worst > 0)
+    ]
+
+
+def limit_note(beyond: Sequence[Mapping[str, Any]]) -> str:
+    """What `beyond_limits` found in one sentence, and what to do about it."""
+    said = [
+        f"{joint['joint']} ({number(joint['lower'])} .. {number(joint['upper'])}) gets to "
+        f"{number(joint['farthest'])}, outside from {number(joint['since'])} s"
+        for joint in beyond[:_SHOWN]
+    ]
+    if len(beyond) > _SHOWN:
+        said.append(f"and {len(beyond) - _SHOWN} more")
+    return (
+        f"Beyond their limits, which exert no force: {'; '.join(said)}. "
+        "Drive or lock such joints, or give them stops (limit_stiffness)."
+    )
