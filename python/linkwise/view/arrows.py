@@ -45,6 +45,12 @@ def colors_of_use(use: Array) -> npt.NDArray[np.uint8]:
     return np.asarray(np.rint(mixed), dtype=np.uint8)
 
 
+def color_table() -> dict[str, list[object]]:
+    """The colours, for player.js."""
+    tables = {"size": _STOPS, "use": _USE_STOPS, "overloaded": _OVERLOADED, "unrated": _UNRATED}
+    return {name: table.tolist() for name, table in tables.items()}
+
+
 def color_bar() -> str:
     """The colours as a CSS gradient, small ones left."""
     return f"linear-gradient(90deg, {', '.join(map(_css, _STOPS))})"

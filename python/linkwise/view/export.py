@@ -1,25 +1,40 @@
-"""A scene that plays offline: one HTML file with viser's own player inside."""
+"""A scene that plays offline: one HTML file with viser's client, the data, and what plays it.
+
+The page is the live view's: viser's client unchanged with the messages that a server sends to a new
+client, and `player.js` in the place of the server.
+"""
 
 from __future__ import annotations
 
+import base64
+import gzip
+import json
 import os
+from html import escape
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from linkwise import _core
 from linkwise._core import InputError
-from linkwise.view.player import overlay
-from linkwise.view.scene import Scene
-from linkwise.view.server import LOCAL, running
+from linkwise.view import arrows
+from linkwise.view.live import View
+from linkwise.view.panel import legend
+from linkwise.view.server import LOCAL, client_page, replay, running
+from linkwise.view.shapes import Array, quaternions
 from linkwise.view.shown_loads import rating_use
 from linkwise.view.source import Source, static_loads
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
+    from linkwise.view.scene import Scene
 
 FRAMES_PER_SECOND = 30
 MOST_FRAMES = 3000
 MOST_BYTES = 192 << 20
-"""Of poses before compression; longer runs of larger machines get fewer frames."""
-_BYTES_PER_JOINT = 150
+"""Of poses and loads before compression; longer runs of larger machines get fewer frames."""
 
 
 class Exported(NamedTuple):
@@ -29,6 +44,48 @@ class Exported(NamedTuple):
     frames: int
     duration: float
     bytes: int
+
+
+class Motion(NamedTuple):
+    """What moves, over the frames of the film.
+
+    poses: (frames, n, 7: position, quaternion with its scalar first) of the joint frames, then of
+    those links' frames that are not one of them; link_poses: where each link's is in there;
+    loads: (frames, causes, n_joints, 6) of the causes named.
+    """
+
+    times: Array
+    poses: npt.NDArray[np.float32]
+    link_poses: npt.NDArray[np.int64]
+    loads: npt.NDArray[np.float32]
+    causes: list[str]
+
+
+class Blob:
+    """Arrays one after the other; in JSON each is a placeholder, as in viser's own messages."""
+
+    def __init__(self) -> None:
+        self.parts: list[memoryview] = []
+
+    def add(self, values: Any, dtype: str) -> dict[str, Any]:
+        self.parts.append(np.ascontiguousarray(values, dtype=dtype).data)
+        return {"__binary_index": len(self.parts) - 1, "dtype": dtype}
+
+    def packed(self, content: dict[str, Any]) -> str:
+        """Base64 of the compressed content: length of the JSON, JSON, arrays at multiples of 8."""
+
+        def other(value: Any) -> dict[str, Any]:
+            if isinstance(value, np.ndarray):
+                return self.add(value, "<i4" if value.dtype.kind == "i" else "<f4")
+            return self.add(np.frombuffer(value, dtype=np.uint8), "|u1")
+
+        text = json.dumps({"content": content}, default=other, allow_nan=False)[:-1]
+        head = f'{text}, "lengths": {[part.nbytes for part in self.parts]}}}'.encode()
+        out = bytearray(len(head).to_bytes(8, "little") + head)
+        for part in self.parts:
+            out += bytes(-len(out) % 8)
+            out += part.cast("B")
+        return base64.b64encode(gzip.compress(out, 6)).decode("ascii")
 
 
 def check_file(path: str | os.PathLike[str]) -> Path:
@@ -44,10 +101,10 @@ def check_file(path: str | os.PathLike[str]) -> Path:
     return file
 
 
-def frame_samples(times: Any, n_joints: int) -> Any:
+def frame_samples(times: Any, frame_bytes: int) -> Any:
     """Which samples become frames: evenly in time, as many as the size allows."""
     span = float(times[-1] - times[0])
-    fitting = max(2, MOST_BYTES // (_BYTES_PER_JOINT * max(1, n_joints)))
+    fitting = max(2, MOST_BYTES // max(1, frame_bytes))
     count = min(int(span * FRAMES_PER_SECOND) + 1, MOST_FRAMES, fitting)
     wanted = np.linspace(times[0], times[-1], max(2, count))
     return np.unique(np.clip(np.searchsorted(times, wanted), 0, len(times) - 1))
@@ -58,43 +115,126 @@ def write_html(
 ) -> Exported:
     """Write the source as a file that needs neither network nor linkwise.
 
-    A run becomes a film of its samples with their loads and a plot of the load of a joint, a model
-    a still with nothing moving. by_rating: colours show how much of the ratings loads use.
+    A run becomes a film of its samples with the panel of the live view, a model a still of the
+    machine at rest. by_rating: colours show how much of the ratings loads use from the start.
     """
     file = check_file(path)
-    use = rating_use(source, by_rating)
+    motion = _still(source) if source.recording is None else _film(source)
     with running(LOCAL, 0, source.title) as server:
-        scene = Scene(server, source)
-        scene.use = use if by_rating else None
-        recording = source.recording
-        if recording is None:
-            q = source.model.neutral_configuration()
-            scene.show(scene.at(q, static_loads(source.model, q)))
-            html, frames, duration = server.get_scene_serializer().as_html(), 1, 0.0
-        else:
-            scene.set_largest(*recording.largest)
-            chosen = frame_samples(recording.times, source.model.n_joints)
-            serializer = None
-            for k, sample in enumerate(chosen):
-                loads = recording.load(sample) if recording.has_loads else None
-                scene.show(scene.at(recording.position(sample), loads))
-                if serializer is None:  # it begins with the scene as it is
-                    serializer = server.get_scene_serializer()
-                after = chosen[min(k + 1, len(chosen) - 1)]
-                serializer.insert_sleep(float(recording.times[after] - recording.times[sample]))
-            assert serializer is not None
-            html, frames = serializer.as_html(), len(chosen)
-            duration = float(recording.times[chosen[-1]] - recording.times[chosen[0]])
-    html = _with_overlay(html, overlay(source, by_rating=by_rating))
+        view = View(server, source, by_rating=by_rating, posable=False)
+        view.step(0.0)
+        content = _content(source, view.scene, motion)
+        content["byRating"] = by_rating
+        blob = Blob()
+        content["messages"] = replay(server, blob.parts)
+    page = _page(source.title, blob, content)
     try:
-        file.write_text(html, encoding="utf-8")
+        file.write_text(page, encoding="utf-8")
     except OSError as error:
         raise InputError(
             f"export {str(path)!r}: cannot be written ({error.strerror}); choose another path"
         ) from None
-    return Exported(file, frames, duration, file.stat().st_size)
+    duration = float(motion.times[-1] - motion.times[0])
+    return Exported(file, motion.times.size, duration, file.stat().st_size)
 
 
-def _with_overlay(html: str, overlay: str) -> str:
-    before, found, after = html.rpartition("</body>")
-    return before + overlay + found + after if found else html + overlay
+def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
+    """Where each link's pose is among those of the joint frames and then of other links.
+
+    A body is named after one of its links, whose frame is the joint's in most files: two frames of
+    one rigid body that agree in one position agree in all.
+    """
+    links, joints = np.asarray(_core.link_poses(model, q)), np.asarray(_core.body_poses(model, q))
+    index = {name: k for k, name in enumerate(model.link_names)}
+    found = np.full(len(links), -1)
+    for joint, body in enumerate(model.body_names):
+        if np.array_equal(links[index[body]], joints[joint]):
+            found[index[body]] = joint
+    others = np.flatnonzero(found < 0)
+    found[others] = len(joints) + np.arange(others.size)
+    return found
+
+
+def _poses(model: Model, q: Array, link_poses: npt.NDArray[np.int64]) -> Array:
+    links = np.asarray(_core.link_poses(model, q))[link_poses >= model.n_joints]
+    frames = np.concatenate([np.asarray(_core.body_poses(model, q)), links])
+    return np.concatenate([frames[:, :3, 3], quaternions(frames[:, :3, :3])], axis=1)
+
+
+def _still(source: Source) -> Motion:
+    model = source.model
+    q = model.neutral_configuration()
+    where = _link_poses(model, q)
+    poses, loads = _poses(model, q, where)[None], static_loads(model, q)[None, None]
+    return Motion(np.zeros(1), poses.astype(np.float32), where, loads.astype(np.float32), [])
+
+
+def _film(source: Source) -> Motion:
+    recording, model = source.recording, source.model
+    assert recording is not None
+    causes = recording.causes.names if recording.causes is not None else []
+    parts = max(1, len(causes)) if recording.has_loads else 0
+    where = _link_poses(model, recording.position(0))
+    n_poses = max(model.n_joints, int(where.max(initial=-1)) + 1)
+    chosen = frame_samples(recording.times, 4 * (7 * n_poses + 6 * parts * model.n_joints))
+    poses = np.empty((chosen.size, n_poses, 7), dtype=np.float32)
+    loads = np.empty((chosen.size, parts, model.n_joints, 6), dtype=np.float32)
+    for k, sample in enumerate(chosen):
+        poses[k] = _poses(model, recording.position(sample), where)
+        if parts and not causes:
+            loads[k, 0] = recording.load(sample)
+    if causes:
+        assert recording.causes is not None
+        loads[:] = recording.causes.shares(chosen)
+    return Motion(recording.times[chosen], poses, where, loads, causes)
+
+
+def _content(source: Source, scene: Scene, motion: Motion) -> dict[str, Any]:
+    """Everything that player.js needs but the messages."""
+    recording = source.recording
+    largest = scene.style.largest
+    layers = [
+        {"toggle": toggle, "name": layer.handle.name, **layer.place.plan()}
+        for toggle, layers in scene.layers.items()
+        for layer in layers
+    ]
+    for layer in layers:
+        if "links" in layer:
+            layer["links"] = motion.link_poses[layer["links"]]
+    names = source.model.joint_names
+    use = rating_use(source, needed=False)
+    rating = None
+    if use is not None:
+        rating = {"directions": np.nan_to_num(use.directions, nan=np.inf), "limits": use.limits}
+    chosen = motion.causes
+    if recording is not None and recording.causes is not None:
+        chosen = sorted(recording.causes.chosen)
+    return {
+        "times": [float(t) for t in motion.times],
+        "poses": motion.poses,
+        "loads": motion.loads,
+        "causes": motion.causes,
+        "chosen": chosen,
+        "jointNames": names,
+        "toggles": scene.toggles,
+        "layers": layers,
+        "largest": largest,
+        "longest": scene.style.longest,
+        "rating": rating,
+        "legends": [legend(largest, by_rating) for by_rating in (False, True)],
+        "colors": arrows.color_table(),
+        "film": recording is not None,
+    }
+
+
+def _page(title: str, blob: Blob, content: dict[str, Any]) -> str:
+    """viser's page with the data and the player ahead of its own scripts."""
+    script = (Path(__file__).parent / "player.js").read_text(encoding="utf-8")
+    page = client_page()
+    at = page.index("</head>")
+    ours = (
+        f"<script type='text/plain' id='linkwise-data'>{blob.packed(content)}</script>"
+        f"<script>{script}</script>"
+    )
+    page = page[:at] + ours + page[at:]
+    return page.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1)

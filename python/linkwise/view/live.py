@@ -35,10 +35,18 @@ _PLOT_INTERVAL = 0.1
 
 
 class View:
-    """A source on a server: the scene, the panel, and what moves them."""
+    """A source on a server: the scene, the panel, and what moves them.
+
+    posable: whether a model alone gets sliders.
+    """
 
     def __init__(
-        self, server: viser.ViserServer, source: Source, *, by_rating: bool = False
+        self,
+        server: viser.ViserServer,
+        source: Source,
+        *,
+        by_rating: bool = False,
+        posable: bool = True,
     ) -> None:
         self._source = source
         self._wishes = Wishes(redraw=True)
@@ -49,16 +57,17 @@ class View:
         self.scene = Scene(server, source)
         recording = source.recording
         self._use = rating_use(source, by_rating)
-        self.scene.use = self._use if by_rating else None
+        self.scene.style.use = self._use if by_rating else None
         self._largest = (0.0, 0.0) if recording is None else recording.largest
         self._plot: LoadPlot | None = None
         self._choice: JointChoice | None = None
         self._playback: Playback | None = None
         if recording is not None:
-            self.scene.set_largest(*recording.largest)
+            self.scene.style.largest = recording.largest
             self._playback = Playback(float(recording.times[0]), float(recording.times[-1]))
             self._controls = PlaybackControls(server, self._playback, self._wishes)
-        else:
+        self._sliders: JointSliders | None = None
+        if recording is None and posable:
             self._sliders = JointSliders(server, source.model, 0.5 * self.scene.size, self._wishes)
         if recording is None or recording.has_loads:
             self._add_loads(server, recording, by_rating)
@@ -116,22 +125,23 @@ class View:
                 self._plot.choose(self._joint)
         if self._wishes.by_rating is not None:
             by_rating, self._wishes.by_rating = self._wishes.by_rating, None
-            self.scene.use = self._use if by_rating else None
+            self.scene.style.use = self._use if by_rating else None
             self._legend.content = legend(self._largest, by_rating)
             changed = True
         return changed
 
     def _draw_pose(self) -> None:
-        model, q = self._source.model, self._sliders.q.copy()
+        model = self._source.model
+        q = model.neutral_configuration() if self._sliders is None else self._sliders.q.copy()
         loads = static_loads(model, q)
         largest = tuple(
             float(np.linalg.norm(half, axis=1).max(initial=0.0))
             for half in (loads[:, :3], loads[:, 3:])
         )
         self._largest = (largest[0], largest[1])
-        self.scene.set_largest(*largest)
+        self.scene.style.largest = self._largest
         self.scene.show(self.scene.at(q, loads))
-        self._legend.content = legend(self._largest, self.scene.use is not None)
+        self._legend.content = legend(self._largest, self.scene.style.use is not None)
         self._tell("held still: ", loads[self._joint])
 
     def _draw_sample(self, recording: Recording, seconds: float, forced: bool) -> None:

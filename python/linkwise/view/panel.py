@@ -87,7 +87,7 @@ def add_show_folder(server: viser.ViserServer, scene: Scene, wishes: Wishes) -> 
                                            initial_value=1.0)  # fmt: skip
 
             def resize(event: Any) -> None:
-                scene.arrow_scale = slider.value
+                scene.set_arrow_scale(slider.value)
                 wishes.redraw = True
 
             slider.on_update(resize)

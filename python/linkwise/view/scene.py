@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,15 +11,23 @@ import numpy as np
 
 from linkwise import _core
 from linkwise.io.urdf_visuals import Visual
-from linkwise.view.arrows import in_world, instances
 from linkwise.view.meshes import load_mesh
+from linkwise.view.placement import (
+    Fixed,
+    Following,
+    Lines,
+    Loads,
+    LoadStyle,
+    Marks,
+    Moment,
+    Placement,
+    Spanning,
+)
 from linkwise.view.shapes import (
     Array,
     Mesh,
     equivalent_boxes,
-    quaternions,
     turned,
-    turning_z_to,
     unit_arc,
     unit_arrow,
     unit_box,
@@ -31,7 +38,6 @@ from linkwise.view.shapes import (
 if TYPE_CHECKING:
     import viser
 
-    from linkwise.view.shown_loads import RatingUse
     from linkwise.view.source import Source
 
 _TONES = np.array([[86, 112, 140], [150, 170, 190]], dtype=np.uint8)
@@ -42,20 +48,11 @@ _ARROW_SHARE = 0.22  # of the machine's size: the largest load's arrow
 
 
 @dataclass
-class Moment:
-    """One moment of the machine: frames of links and joints (n, 4, 4), loads (n_joints, 6)."""
-
-    links: Array
-    joints: Array
-    loads: Array | None
-
-
-@dataclass
 class Layer:
     """Something drawn; `place` gives the properties of its handle that change with the moment."""
 
     handle: Any
-    place: Callable[[Moment], dict[str, Any]]
+    place: Placement
 
     def show(self, moment: Moment) -> None:
         if self.handle.visible:
@@ -70,17 +67,14 @@ class Scene:
         self._scene = server.scene
         self._model = model = source.model
         self._inboard = np.array(model.joint_parents, dtype=int)
-        self._largest = (0.0, 0.0)
-        self.arrow_scale = 1.0
-        self.use: RatingUse | None = None
-        """Colours by use of the ratings; None: by size."""
-        self._layers: dict[str, list[Layer]] = defaultdict(list)
+        self.layers: dict[str, list[Layer]] = defaultdict(list)
         self.joint_marks: Any = None
         start = model.neutral_configuration()
         if source.recording is not None:
             start = source.recording.position(0)
         self._moment = self.at(start, None)
         self.center, self.size = _extent(self._moment, model)
+        self.style = LoadStyle((0.0, 0.0), _ARROW_SHARE * self.size)
         self.toggles: dict[str, bool] = {}
         self._add_looks(source)
         self._add_shapes(bare="Meshes" not in self.toggles)
@@ -98,27 +92,27 @@ class Scene:
 
     def show(self, moment: Moment) -> None:
         self._moment = moment
-        for layers in self._layers.values():
+        for layers in self.layers.values():
             for layer in layers:
                 layer.show(moment)
 
     def toggle(self, name: str, shown: bool) -> None:
         """Show or hide a layer. Hidden ones are not kept up to date, so it is placed again."""
         self.toggles[name] = shown
-        for layer in self._layers[name]:
+        for layer in self.layers[name]:
             layer.handle.visible = shown
             layer.show(self._moment)
 
-    def set_largest(self, force: float, moment: float) -> None:
-        """The magnitudes that get the longest arrow and arc."""
-        self._largest = (force, moment)
+    def set_arrow_scale(self, scale: float) -> None:
+        """Draw arrows and arcs this many times as long as by default."""
+        self.style.longest = scale * _ARROW_SHARE * self.size
 
     # -- links ------------------------------------------------------------------------------
 
     def _add(self, toggle: str, shown: bool, mesh: Mesh, count: int, **style: Any) -> Any:
         """An empty group of `count` instances."""
         self.toggles.setdefault(toggle, shown)
-        name = f"/{toggle.lower().replace(' ', '_')}/{len(self._layers[toggle])}"
+        name = f"/{toggle.lower().replace(' ', '_')}/{len(self.layers[toggle])}"
         return self._scene.add_batched_meshes_simple(
             name,
             mesh.vertices,
@@ -144,7 +138,7 @@ class Scene:
             offsets = np.stack([visual.placement for visual in visuals])
             handle = self._add_look(shape, path, visuals, source.notes)
             if handle is not None:
-                self._layers["Meshes"].append(Layer(handle, _following(links, offsets)))
+                self.layers["Meshes"].append(Layer(handle, Following(links, offsets)))
 
     def _add_look(
         self, shape: str, path: Path | None, visuals: list[Visual], notes: list[str]
@@ -159,7 +153,7 @@ class Scene:
                 return None
             self.toggles.setdefault("Meshes", True)
             return self._scene.add_batched_meshes_trimesh(
-                f"/meshes/{len(self._layers['Meshes'])}",
+                f"/meshes/{len(self.layers['Meshes'])}",
                 mesh,
                 np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
                 np.zeros((count, 3)),
@@ -197,7 +191,7 @@ class Scene:
                 handle = self._add(
                     toggle, shown, unit_box(), chosen.size, batched_scales=edges, **style
                 )
-                self._layers[toggle].append(Layer(handle, _following(chosen, offsets[chosen])))
+                self.layers[toggle].append(Layer(handle, Following(chosen, offsets[chosen])))
         few = model.n_joints <= _MANY
         outboard = np.flatnonzero(inboard >= 0)
         thick = self._thickness()
@@ -210,8 +204,8 @@ class Scene:
                 batched_scales=np.ones((outboard.size, 3)),
                 batched_colors=_ROD_TONE,
             )
-            ends = (inboard[outboard], outboard)
-            self._layers["Bodies"].append(Layer(handle, _spanning(ends, 0.55 * thick)))
+            rods = Spanning(inboard[outboard], outboard, 0.55 * thick)
+            self.layers["Bodies"].append(Layer(handle, rods))
         if not few:  # lines keep their width on the screen, however far away they are
             lines = self._scene.add_line_segments(
                 "/bodies/lines",
@@ -220,7 +214,7 @@ class Scene:
                 thickness=2.5,
                 thickness_units="screen",
             )
-            self._layers["Bodies"].append(Layer(lines, _lines(inboard[outboard], outboard)))
+            self.layers["Bodies"].append(Layer(lines, Lines(inboard[outboard], outboard)))
         self.joint_marks = self._add(
             "Joints",
             bare and few,
@@ -229,9 +223,7 @@ class Scene:
             batched_scales=np.full(model.n_joints, thick),
             batched_colors=_MARK_TONE,
         )
-        self._layers["Joints"].append(
-            Layer(self.joint_marks, lambda moment: {"batched_positions": moment.joints[:, :3, 3]})
-        )
+        self.layers["Joints"].append(Layer(self.joint_marks, Marks()))
 
     def _thickness(self) -> float:
         """Radius of the joint marks: small beside the links and, of short chains, the machine."""
@@ -259,25 +251,7 @@ class Scene:
                 batched_scales=np.full(self._model.n_joints, 1e-9),
                 batched_colors=np.zeros((self._model.n_joints, 3), dtype=np.uint8),
             )
-            self._layers[toggle].append(Layer(handle, self._loads(half)))
-
-    def _loads(self, half: int) -> Callable[[Moment], dict[str, Any]]:
-        def place(moment: Moment) -> dict[str, Any]:
-            if moment.loads is None:
-                return {}
-            vectors = in_world(moment.joints, moment.loads)[half]
-            longest = _ARROW_SHARE * self.size * self.arrow_scale
-            use = None if self.use is None else self.use.of(moment.loads, half)
-            points = moment.joints[:, :3, 3]
-            made = instances(points, vectors, self._largest[half], longest, use)
-            return {
-                "batched_positions": made.positions,
-                "batched_wxyzs": made.quaternions,
-                "batched_scales": made.scales,
-                "batched_colors": made.colors,
-            }
-
-        return place
+            self.layers[toggle].append(Layer(handle, Loads(half, self.style)))
 
     # -- view -------------------------------------------------------------------------------
 
@@ -305,7 +279,7 @@ class Scene:
             section_color=(190, 196, 204),
         )
         self.toggles["Grid"] = True
-        self._layers["Grid"].append(Layer(grid, lambda moment: {}))
+        self.layers["Grid"].append(Layer(grid, Fixed()))
 
     def _floor(self) -> float:
         """Height of the grid: the lowest point, or the ground where the machine stands on it."""
@@ -323,43 +297,6 @@ def _across(moment: Moment) -> tuple[Array, Array]:
     right *= 1.0 if right[0] >= 0 else -1.0
     away = np.array([right[1], -right[0], 0.45])
     return right, away / np.linalg.norm(away)
-
-
-def _following(links: Any, offsets: Array) -> Callable[[Moment], dict[str, Array]]:
-    def place(moment: Moment) -> dict[str, Array]:
-        frames = moment.links[links] @ offsets
-        return {
-            "batched_positions": frames[:, :3, 3],
-            "batched_wxyzs": quaternions(frames[:, :3, :3]),
-        }
-
-    return place
-
-
-def _spanning(ends: tuple[Any, Any], radius: float) -> Callable[[Moment], dict[str, Array]]:
-    """Rods between joint points: a sliding joint changes their length."""
-
-    def place(moment: Moment) -> dict[str, Array]:
-        here, there = (moment.joints[end, :3, 3] for end in ends)
-        span = there - here
-        length = np.linalg.norm(span, axis=1)
-        along = np.where(length[:, None] > 0, span / np.maximum(length, 1e-300)[:, None], [0, 0, 1])
-        scales = np.column_stack([np.full((length.size, 2), radius), np.maximum(length, 1e-9)])
-        return {
-            "batched_positions": (here + there) / 2,
-            "batched_wxyzs": turning_z_to(along),
-            "batched_scales": scales,
-        }
-
-    return place
-
-
-def _lines(inboard: Any, outboard: Any) -> Callable[[Moment], dict[str, Array]]:
-    def place(moment: Moment) -> dict[str, Array]:
-        points = moment.joints[:, :3, 3]
-        return {"points": np.stack([points[inboard], points[outboard]], axis=1)}
-
-    return place
 
 
 def _extent(moment: Moment, model: _core.Model) -> tuple[Array, float]:

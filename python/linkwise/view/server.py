@@ -8,6 +8,7 @@ import io
 import os
 import socket
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from linkwise._core import InputError
@@ -50,6 +51,23 @@ def check_address(host: str, port: int) -> None:
             f"port {port}: is in use on {host}; give another with --port, or --port 0 for any free "
             "one"
         ) from None
+
+
+def client_page() -> str:
+    """The one page that viser's client is."""
+    return (Path(_viser().__file__).parent / "client/build/index.html").read_text(encoding="utf-8")
+
+
+def replay(server: viser.ViserServer, arrays: list[memoryview]) -> list[dict[str, Any]]:
+    """The messages that the server sends to a client that connects, as dictionaries.
+
+    Their arrays are appended to `arrays`; in the messages stand placeholders with their indices.
+    """
+    buffer = server._websock_server._broadcast_buffer
+    server.flush()
+    with buffer.buffer_lock:
+        held = list(buffer.message_from_id.values())
+    return [message.as_serializable_dict(arrays) for message in held]
 
 
 @contextlib.contextmanager

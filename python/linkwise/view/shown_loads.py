@@ -68,6 +68,14 @@ class CauseLoads:
             self._first = first
         return np.asarray(self._shares[sample - first][self._mask()].sum(axis=0))
 
+    def shares(self, samples: Array) -> Array:
+        """Loads (samples, causes, n_joints, 6) of every cause at some samples."""
+        parts = [
+            self._split.shares(samples[k : k + self._rows].tolist())
+            for k in range(0, len(samples), self._rows)
+        ]
+        return np.concatenate(parts)
+
     def history(self, joint: int, samples: Array) -> tuple[Array, Array]:
         """Samples, at most as many as a machine of this size allows, and loads (n, 6) there."""
         chosen = samples[:: max(1, -(-len(samples) // self._most))]
@@ -86,16 +94,17 @@ class RatingUse:
     """How much of their ratings loads use; NaN for joints without any."""
 
     def __init__(self, model: Model, ratings: Mapping[str, Rating]) -> None:
-        self._directions = joint_directions(model)
+        self.directions = joint_directions(model)
         names = [name for half in _HALVES for name in half]
         table = rating_table(ratings, model.joint_names, [*names, "drive_power"])
-        self._limits = dict(zip(names, table, strict=False))
+        self.limits = dict(zip(names, table, strict=False))
+        """Ratings (n_joints,) of a quantity, NaN where there is none."""
         self.known = bool(np.isfinite(table[:-1]).any())
 
     def of(self, loads: Array, half: int) -> Array:
         """The largest share (n_joints,) of a rating that forces (0) or moments (1) use."""
-        found = derive(loads, self._directions)
-        uses = [np.abs(found[name]) / self._limits[name] for name in _HALVES[half]]
+        found = derive(loads, self.directions)
+        uses = [np.abs(found[name]) / self.limits[name] for name in _HALVES[half]]
         return np.asarray(np.fmax.reduce(uses))
 
 

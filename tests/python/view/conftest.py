@@ -1,5 +1,6 @@
 """A short run of the Shuttle's arm, the command line in this process, and a browser."""
 
+import os
 import shutil
 import sys
 import threading
@@ -32,6 +33,14 @@ def run_path(arm, tmp_path_factory):
         drives={"shoulder_yaw": 300.0, "elbow_pitch": -200.0},
         output=path,
     )
+    return path
+
+
+@pytest.fixture(scope="session")
+def ratings_path(tmp_path_factory):
+    """Ratings of one joint, which the run exceeds."""
+    path = tmp_path_factory.mktemp("ratings") / "ratings.toml"
+    path.write_text("[rating.shoulder_yaw]\nforce = 1\n")
     return path
 
 
@@ -93,16 +102,20 @@ def serve():
         assert not thread.is_alive()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def chromium():
-    """A headless Chromium; a test is skipped, and says so, where there is none."""
-    playwright = pytest.importorskip(
-        "playwright.sync_api", reason="browser tests need playwright: pip install '.[test]'"
-    )
+    """A headless Chromium. Without one tests are skipped, and say so; where the environment sets
+    LINKWISE_NEEDS_CHROMIUM they fail instead.
+    """
+    missing = pytest.fail if os.environ.get("LINKWISE_NEEDS_CHROMIUM") else pytest.skip
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        missing("browser tests need playwright: pip install '.[test]'")
     executable = next(filter(None, map(shutil.which, CHROMIUMS)), None)
     if executable is None:
-        pytest.skip("browser tests need Chromium, which is not here: apt-get install chromium")
-    with playwright.sync_playwright() as driver:
+        missing("browser tests need Chromium, which is not here: apt-get install chromium")
+    with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=executable, args=CHROMIUM_ARGUMENTS)
         yield browser
         browser.close()

@@ -1,6 +1,7 @@
 """Loads of chosen causes and colours by rating, and what the exported page holds of them."""
 
 import base64
+import gzip
 import json
 import re
 
@@ -103,29 +104,49 @@ def test_ratings_come_from_the_scenario_or_a_file(linkwise, tmp_path):
         assert rating_use(other, True).known
 
 
-def plotted(page):
-    """Names, times and loads that the page plots."""
-    content = json.loads(
-        re.search(r"<script type='application/json' id='linkwise-loads'>(.*?)</script>", page)[1]
-    )
+def embedded(path):
+    """What an exported page holds: `content` with the arrays in their places."""
+    text = path.read_text(encoding="utf-8")
+    packed = re.search(r"id='linkwise-data'>(.*?)</script>", text)[1]
+    data = gzip.decompress(base64.b64decode(packed))
+    size = int.from_bytes(data[:8], "little")
+    found = json.loads(data[8 : 8 + size])
+    arrays, at = [], 8 + size
+    for length in found["lengths"]:
+        at += -at % 8
+        arrays.append(data[at : at + length])
+        at += length
+    assert at == len(data)
 
-    def numbers(packed):
-        return np.frombuffer(base64.b64decode(packed["bdata"]), "<f4")
+    def filled(value):
+        if isinstance(value, dict) and "__binary_index" in value:
+            return np.frombuffer(arrays[value["__binary_index"]], value["dtype"])
+        return value
 
-    names = re.findall(r"<option>(.*?)</option>", page)
-    return names, numbers(content["times"]), [numbers(x).reshape(-1, 6) for x in content["loads"]]
+    return {name: filled(value) for name, value in found["content"].items()}
 
 
 @pytest.mark.parametrize("causes", [[], ["gravity", "drive"]])
-def test_exported_page_plots_what_the_arrows_show(loaded_path, tmp_path, causes):
+def test_exported_page_holds_the_load_of_every_cause(loaded_path, tmp_path, causes):
     pytest.importorskip("viser", reason="the view needs viser: pip install '.[view]'")
     written = write_html(open_source(loaded_path, Options(causes=causes)), tmp_path / "a.html")
-    page = written.path.read_text(encoding="utf-8")
-    names, times, loads = plotted(page)
+    page = embedded(written.path)
     run = lw.open_run(loaded_path)
-    assert names == ["shoulder", "elbow", "wrist"]
-    np.testing.assert_allclose(times, run.time, rtol=1e-6)
-    expected = lw.loads.split(run).sel(cause=causes).sum("cause") if causes else run.joint_load
-    for name, load in zip(names, loads, strict=True):
-        np.testing.assert_allclose(load, expected.sel(joint=name), rtol=1e-5, atol=1e-4)
-    assert ("caused by drive, gravity" in page) == bool(causes)
+    assert page["jointNames"] == ["shoulder", "elbow", "wrist"]
+    shares = lw.loads.split(run).sel(time=page["times"])
+    assert shares.sizes["time"] == 31  # 30 frames in this second, of 101 samples
+    assert page["causes"] == shares.cause.values.tolist()
+    assert page["chosen"] == sorted(causes or page["causes"])
+    loads = page["loads"].reshape(-1, len(page["causes"]), 3, 6)
+    np.testing.assert_allclose(loads, shares.values, rtol=1e-6, atol=1e-4)
+
+
+def test_page_of_a_run_without_a_split_holds_the_whole_load(loaded_path, tmp_path):
+    pytest.importorskip("viser", reason="the view needs viser: pip install '.[view]'")
+    source = open_source(loaded_path, Options())
+    source.recording.causes = None
+    page = embedded(write_html(source, tmp_path / "a.html").path)
+    assert (page["causes"], page["chosen"]) == ([], [])
+    loads = page["loads"].reshape(-1, 3, 6)
+    whole = lw.open_run(loaded_path).joint_load.sel(time=page["times"])
+    np.testing.assert_allclose(loads, whole, rtol=1e-6, atol=1e-4)

@@ -1,0 +1,161 @@
+"""Where the parts of a picture are at a moment: the properties of a group of instances.
+
+Each placement also says how it is made (`plan`), so that player.js makes the same pictures in an
+exported page: a kind there is a class here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from linkwise.view.arrows import in_world, instances
+from linkwise.view.shapes import Array, quaternions, turning_z_to
+
+if TYPE_CHECKING:
+    from linkwise.view.shown_loads import RatingUse
+
+Indices = npt.NDArray[np.int64]
+
+
+@dataclass
+class Moment:
+    """One moment of the machine: frames of links and joints (n, 4, 4), loads (n_joints, 6)."""
+
+    links: Array
+    joints: Array
+    loads: Array | None
+
+
+@dataclass
+class LoadStyle:
+    """How loads are drawn, whichever they are.
+
+    largest: the force and the moment that get the longest arrow and arc, of the length `longest`
+    [m]; use: colours by use of the ratings (None: by size).
+    """
+
+    largest: tuple[float, float]
+    longest: float
+    use: RatingUse | None = None
+
+
+class Placement(Protocol):
+    def __call__(self, moment: Moment) -> dict[str, Any]:
+        """What changes of the group's properties."""
+
+    def plan(self) -> dict[str, Any]:
+        """Kind and parameters, for player.js."""
+
+
+@dataclass
+class Following:
+    """Instances fixed to links: `offsets` (n, 4, 4) from the frames of the links."""
+
+    links: Indices
+    offsets: Array
+
+    def __call__(self, moment: Moment) -> dict[str, Array]:
+        frames = moment.links[self.links] @ self.offsets
+        return {
+            "batched_positions": frames[:, :3, 3],
+            "batched_wxyzs": quaternions(frames[:, :3, :3]),
+        }
+
+    def plan(self) -> dict[str, Any]:
+        return {
+            "kind": "following",
+            "links": self.links,
+            "positions": self.offsets[:, :3, 3],
+            "wxyzs": quaternions(self.offsets[:, :3, :3]),
+        }
+
+
+@dataclass
+class Spanning:
+    """Rods between joint points: a sliding joint changes their length."""
+
+    inboard: Indices
+    outboard: Indices
+    radius: float
+
+    def __call__(self, moment: Moment) -> dict[str, Array]:
+        here, there = (moment.joints[end, :3, 3] for end in (self.inboard, self.outboard))
+        span = there - here
+        length = np.linalg.norm(span, axis=1)
+        along = np.where(length[:, None] > 0, span / np.maximum(length, 1e-300)[:, None], [0, 0, 1])
+        scales = np.column_stack([np.full((length.size, 2), self.radius), np.maximum(length, 1e-9)])
+        return {
+            "batched_positions": (here + there) / 2,
+            "batched_wxyzs": turning_z_to(along),
+            "batched_scales": scales,
+        }
+
+    def plan(self) -> dict[str, Any]:
+        ends = {"inboard": self.inboard, "outboard": self.outboard}
+        return {"kind": "spanning", **ends, "radius": self.radius}
+
+
+@dataclass
+class Lines:
+    """Segments between joint points."""
+
+    inboard: Indices
+    outboard: Indices
+
+    def __call__(self, moment: Moment) -> dict[str, Array]:
+        points = moment.joints[:, :3, 3]
+        return {"points": np.stack([points[self.inboard], points[self.outboard]], axis=1)}
+
+    def plan(self) -> dict[str, Any]:
+        return {"kind": "lines", "inboard": self.inboard, "outboard": self.outboard}
+
+
+@dataclass
+class Marks:
+    """One at every joint point."""
+
+    def __call__(self, moment: Moment) -> dict[str, Array]:
+        return {"batched_positions": moment.joints[:, :3, 3]}
+
+    def plan(self) -> dict[str, Any]:
+        return {"kind": "marks"}
+
+
+@dataclass
+class Loads:
+    """Arrows of forces (half 0) or arcs of moments (half 1) at the joint points."""
+
+    half: int
+    style: LoadStyle
+
+    def __call__(self, moment: Moment) -> dict[str, Any]:
+        if moment.loads is None:
+            return {}
+        vectors = in_world(moment.joints, moment.loads)[self.half]
+        use = None if self.style.use is None else self.style.use.of(moment.loads, self.half)
+        points = moment.joints[:, :3, 3]
+        made = instances(points, vectors, self.style.largest[self.half], self.style.longest, use)
+        return {
+            "batched_positions": made.positions,
+            "batched_wxyzs": made.quaternions,
+            "batched_scales": made.scales,
+            "batched_colors": made.colors,
+        }
+
+    def plan(self) -> dict[str, Any]:
+        return {"kind": "loads", "half": self.half}
+
+
+@dataclass
+class Fixed:
+    """Nothing moves."""
+
+    def __call__(self, moment: Moment) -> dict[str, Any]:
+        return {}
+
+    def plan(self) -> dict[str, Any]:
+        return {"kind": "fixed"}
