@@ -3,7 +3,6 @@
 
 #include "bind.hpp"
 #include "linkwise/constraint/joint_constraint.hpp"
-#include "linkwise/forces/passive.hpp"
 #include "linkwise/integrate/integrator.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "report.hpp"
@@ -17,32 +16,6 @@ struct ForwardResult {
   nb::object acceleration, joint_load, constraint_force;
   PyReport report;
 };
-
-void check_external(const Model& m, const States& s) {
-  if (!s.external.given) return;
-  for (int j = 0; j < m.n_joints(); ++j) {
-    if (m.joints[j].last_of_body) continue;
-    for (size_t i = 0; i < s.count; ++i)
-      for (int k = 0; k < 6; ++k)
-        if (s.external.data[(i * m.n_joints() + j) * 6 + k] != 0)
-          throw InputError(
-              "body '" + m.links[m.joints[j].link].name + "'" + m.where() +
-              " has no mass, so no wrench can act on it; apply it to the next body outboard");
-  }
-}
-
-/// tau with the model's passive forces added, one row a system.
-std::vector<double> with_passive(const Model& m, const States& s) {
-  std::vector<double> tau(s.count * m.nv());
-  std::vector<double> rest(m.nv());
-  for (size_t i = 0; i < s.count; ++i) {
-    double* row = tau.data() + i * m.nv();
-    if (s.tau.given) std::copy(s.tau.data + i * m.nv(), s.tau.data + (i + 1) * m.nv(), row);
-    add_passive_forces(m, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : rest.data(),
-                       row);
-  }
-  return tau;
-}
 
 void check_gravity(double factor) {
   if (!std::isfinite(factor))
@@ -99,20 +72,6 @@ Outcome run_method(const Model& m, DynamicsMethod& method, const States& s, cons
   return worst;
 }
 
-/// The rows of a batch from `first` on.
-BatchInput rows_from(const Model& m, const BatchInput& in, size_t first) {
-  const auto from = [&](const double* rows, size_t width) {
-    return rows ? rows + first * width : nullptr;
-  };
-  BatchInput part = in;
-  part.q = from(in.q, m.nq());
-  part.v = from(in.v, m.nv());
-  part.tau = from(in.tau, m.nv());
-  part.du = from(in.du, m.nv());
-  part.external = from(in.external, 6 * m.n_joints());
-  return part;
-}
-
 nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
                             nb::handle external, bool passive, const std::string& method,
                             const std::string& solver, double tolerance, const std::string& stop,
@@ -123,9 +82,7 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
   States s(m, q, v, tau, "tau", external, prescribed);
   check_external(m, s);
   check_gravity(gravity);
-  if (s.prescribed.given && m.spec().prescribed.empty())
-    throw InputError(
-        "prescribed: the model has no joint of given motion; use model.prescribe([...])");
+  check_prescribed(m, s);
   const ForwardOptions asked{method, solver, stop, tolerance, max_iterations, solver_options};
   const bool plain = (method == "auto" || method == "articulated_body") && solver == "auto";
   // Options that nobody touched need no reading, which costs as much as a small machine's dynamics.
@@ -183,7 +140,7 @@ nb::object forward_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
     const double* total = s.tau.given ? s.tau.data : nullptr;
     if (passive || !total) {
       if (passive && m.has_passive_forces())
-        passive_tau = with_passive(m, s);
+        passive_tau = with_passive(m, s, total);
       else if (!total)
         passive_tau.assign(s.count * m.nv(), 0.0);
       if (!passive_tau.empty()) total = passive_tau.data();

@@ -17,6 +17,7 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
       "linkwise";
   linkwise::bindings::bind_model(m);
   linkwise::bindings::bind_dynamics(m);
+  linkwise::bindings::bind_causes(m);
   linkwise::bindings::bind_kinematics(m);
   linkwise::bindings::bind_simulation(m);
   linkwise::bindings::bind_batch_simulation(m);

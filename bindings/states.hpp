@@ -4,7 +4,9 @@
 
 #include "arrays.hpp"
 #include "interrupt.hpp"
+#include "linkwise/dynamics/batch.hpp"
 #include "linkwise/exec/thread_pool.hpp"
+#include "linkwise/forces/passive.hpp"
 #include "linkwise/simd/lanes.hpp"
 #include "py_model.hpp"
 
@@ -33,6 +35,52 @@ struct States {
     count = product(lead);
   }
 };
+
+/// No wrench acts on a body without mass.
+inline void check_external(const Model& m, const States& s) {
+  if (!s.external.given) return;
+  for (int j = 0; j < m.n_joints(); ++j) {
+    if (m.joints[j].last_of_body) continue;
+    for (size_t i = 0; i < s.count; ++i)
+      for (int k = 0; k < 6; ++k)
+        if (s.external.data[(i * m.n_joints() + j) * 6 + k] != 0)
+          throw InputError(
+              "body '" + m.links[m.joints[j].link].name + "'" + m.where() +
+              " has no mass, so no wrench can act on it; apply it to the next body outboard");
+  }
+}
+
+inline void check_prescribed(const Model& m, const States& s) {
+  if (s.prescribed.given && m.spec().prescribed.empty())
+    throw InputError(
+        "prescribed: the model has no joint of given motion; use model.prescribe([...])");
+}
+
+/// tau, null for none, with the model's passive forces added, one row a system.
+inline std::vector<double> with_passive(const Model& m, const States& s, const double* tau) {
+  std::vector<double> total(s.count * m.nv());
+  if (tau) std::copy(tau, tau + total.size(), total.begin());
+  const std::vector<double> rest(m.nv());
+  for (size_t i = 0; i < s.count; ++i)
+    add_passive_forces(m, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : rest.data(),
+                       total.data() + i * m.nv());
+  return total;
+}
+
+/// The rows of a batch from `first` on.
+inline BatchInput rows_from(const Model& m, const BatchInput& in, size_t first) {
+  const auto from = [&](const double* rows, size_t width) {
+    return rows ? rows + first * width : nullptr;
+  };
+  BatchInput part = in;
+  part.q = from(in.q, m.nq());
+  part.v = from(in.v, m.nv());
+  part.tau = from(in.tau, m.nv());
+  part.du = from(in.du, m.nv());
+  part.passive = from(in.passive, m.nv());
+  part.external = from(in.external, 6 * m.n_joints());
+  return part;
+}
 
 /// f(first, count) on parts of a batch, over threads. Parts end at whole lane groups, so that the
 /// grouping, and with it every bit, is that of one thread. Signals are looked at between parts;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from linkwise import _core
 from linkwise._core import InputError
 from linkwise.loads.samples import (
     Array,
+    drive_kinds,
     external,
     given_motions,
     joint_names,
@@ -51,9 +52,9 @@ _PASSIVE = ("damping", "friction", "stiffness", "limit_stiffness")
 class Split:
     """Evaluates the shares of any block of samples of one run.
 
-    At a given position the constraint-force system A f = b is linear in b, and b in gravity, the
-    velocity terms, drives, external wrenches and passive forces; so is the recursion that solves
-    the same equations. Each cause alone gives its share.
+    At a given position the equations of motion are linear in gravity, the velocity terms, drives,
+    external wrenches and passive forces, and what is factored of them depends on the position
+    alone: by force, one factorisation serves all causes. By motion nothing is to be solved.
     """
 
     def __init__(self, run: Run, by: By, model: Model | None) -> None:
@@ -76,58 +77,54 @@ class Split:
         self.names = [name for name in CAUSES[by] if self._happens(name)]
 
     def _happens(self, cause: str) -> bool:
+        """Can this cause load the machine at all?"""
+        if cause == "gravity":
+            return any(self.model.gravity)
+        if cause in ("velocity", "acceleration"):
+            return not self.imposed.all() or "motion" in self.given.values()
+        if cause == "drive":
+            kinds = drive_kinds(self.run)
+            return kinds is None or not set(kinds.values()) <= {"free", "locked", "motion"}
         if cause == "passive":
-            return any(self.model.dof_property(name).any() for name in _PASSIVE)
+            free = ~self.imposed
+            return any(self.model.dof_property(name)[free].any() for name in _PASSIVE)
         if cause == "external":
             return "external_wrench" in self.run.dataset
-        if cause == "motion":
-            return "motion" in self.given.values()
-        return True
+        return "motion" in self.given.values()
 
     def shares(self, where: slice | Sequence[int]) -> Array:
         """(time, cause, joint, 6) of these samples."""
         q = rows(self.run, "position", where)
         v = rows(self.run, "velocity", where)
         outside = external(self.run, self.model, where)
-        make = self._of_force if self.by == "force" else self._of_motion
-        return np.stack([make(name, q, v, outside, where) for name in self.names], axis=1)
+        if self.by == "force":
+            return self._by_force(q, v, outside, where)
+        return self._by_motion(q, v, outside, where)
 
-    def _of_force(
-        self, cause: str, q: Array, v: Array, outside: Array | None, where: slice | Sequence[int]
+    def _by_force(
+        self, q: Array, v: Array, outside: Array | None, where: slice | Sequence[int]
     ) -> Array:
-        options: dict[str, Any] = {"gravity": 1.0 if cause == "gravity" else 0.0}
-        rates = v if cause == "velocity" else None
-        torque = None
-        if cause == "drive":
-            torque = np.where(self.imposed, 0.0, rows(self.run, "drive_torque", where))
-        elif cause == "passive":
-            torque = _core.passive_torque(self.model, q, v)
-        elif cause == "motion":
-            options["prescribed"] = rows(self.run, "acceleration", where)
-        elif cause == "external":
-            options["external"] = outside
-        found = _core.forward_dynamics(self.free, q, rates, torque, full=True, **options)
-        if found.report.outcome != "converged":
-            raise _core.NumericsError(f"split: {found.report.outcome} at {found.report.body}")
-        return np.asarray(found.joint_load)
+        torque = np.where(self.imposed, 0.0, rows(self.run, "drive_torque", where))
+        held = rows(self.run, "acceleration", where) if "motion" in self.names else None
+        shares = _core.joint_loads_by_cause(
+            self.free, self.names, q, v, torque, external=outside, prescribed=held
+        )
+        return np.asarray(shares)
 
-    def _of_motion(
-        self, cause: str, q: Array, v: Array, outside: Array | None, where: slice | Sequence[int]
+    def _by_motion(
+        self, q: Array, v: Array, outside: Array | None, where: slice | Sequence[int]
     ) -> Array:
-        rates = v if cause == "velocity" else None
-        acceleration = None
-        if cause == "acceleration":
-            acceleration = rows(self.run, "acceleration", where)
-        return np.asarray(
-            _core.inverse_dynamics_loads(
+        shares = np.empty((len(q), len(self.names), self.model.n_joints, 6))
+        for k, cause in enumerate(self.names):
+            shares[:, k] = _core.inverse_dynamics_loads(
                 self.model,
                 q,
-                rates,
-                acceleration,
+                v if cause == "velocity" else None,
+                rows(self.run, "acceleration", where) if cause == "acceleration" else None,
                 external=outside if cause == "external" else None,
                 gravity=1.0 if cause == "gravity" else 0.0,
             )
-        )
+        return shares
 
 
 def split(run: Run, by: By = "force", model: Model | None = None) -> xr.DataArray:

@@ -121,10 +121,18 @@ def external(run: Run, model: Model, where: slice | Sequence[int]) -> Array | No
     return whole
 
 
+def drive_kinds(run: Run) -> dict[str, str] | None:
+    """The kind of each joint's drive, for those that have one; None where the run does not say."""
+    told = run.dataset.attrs.get("drives")
+    if told is None:
+        return None
+    drives: dict[str, Any] = json.loads(told)
+    return {joint: str(drive.get("kind")) for joint, drive in drives.items()}
+
+
 def given_motions(run: Run) -> dict[str, str]:
     """The joints whose motion was given, "locked" or "motion"."""
-    drives: dict[str, Any] = json.loads(run.dataset.attrs.get("drives", "{}"))
-    kinds = {joint: str(drive.get("kind")) for joint, drive in drives.items()}
+    kinds = drive_kinds(run) or {}
     return {joint: kind for joint, kind in kinds.items() if kind in ("locked", "motion")}
 
 

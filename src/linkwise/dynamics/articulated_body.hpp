@@ -54,6 +54,10 @@ class ArticulatedBody {
     return failed_body_ < 0;
   }
 
+  /// The same for another right-hand side at the q of the last evaluate(), which succeeded and was
+  /// asked for loads: with its factors, at half of its cost.
+  void evaluate_again(const SweepInput<S>& in, S* du, S* loads);
+
   int failed_body() const { return failed_body_; }
 
   /// From now on the branches of a large tree are shared by threads, which influence no result.
@@ -76,12 +80,12 @@ class ArticulatedBody {
     Motion<S> v;              ///< velocity, then acceleration
     Force<S> p;               ///< bias wrench, children's share added tip to base
     ArticulatedInertia<S> Y;  ///< children's share
-    Force<S> U;               ///< one-axis joints: Y P; in the end the joint load
+    Force<S> U;               ///< one-axis joints: Y P
     S D_inverse, u, cosine, sine;
   };
 
   /// The sweeps one by one over some of the bodies, for whoever takes care of the others: their v,
-  /// Y, p and U are then read from here and left here.
+  /// Y, p and joint loads are then read from here and left here.
   BodyWork& body(int n) { return body_[n]; }
   const BodyWork& body(int n) const { return body_[n]; }
   /// From now on body n adds to its parent's Y, which the caller clears, and never sets it.
@@ -93,6 +97,8 @@ class ArticulatedBody {
     failed_body_ = -1;
     if (loads && eliminated_.empty()) eliminated_.resize(model_->n_bodies());
   }
+  /// `again`: at the position of the last call.
+  template <bool again = false>
   void calc_velocities(const SweepInput<S>& in, const std::vector<Run>& runs) {
     const Model& model = *model_;
     const Motion<S> resting{};
@@ -115,7 +121,9 @@ class ArticulatedBody {
             general.c = state.c;
           }
         } else {
-          if constexpr (J::is_hinge)
+          if constexpr (again)
+            ;
+          else if constexpr (J::is_hinge)
             sincos(S(in.q[body.q] + k.theta), w.sine, w.cosine);
           else
             pose_[n] = J::pose(k.tree, k.pitch, in.q[body.q]);
@@ -146,9 +154,10 @@ class ArticulatedBody {
     else
       base_to_tip<false>(in, runs, du);
   }
+  Force<S>& joint_load(int n) { return eliminated_[n].p; }
   void store_loads(const SweepInput<S>& in, S* loads) const {
     store_joint_loads(
-        *model_, in.q, [&](int n) -> const Force<S>& { return body_[n].U; }, loads);
+        *model_, in.q, [&](int n) -> const Force<S>& { return eliminated_[n].p; }, loads);
   }
   /// Of several the outermost is named, whichever thread finds one first.
   void fail(int n) {
@@ -163,7 +172,7 @@ class ArticulatedBody {
   /// What the joint load needs: w = Ya x + pa for the parent's acceleration x seen at the body.
   struct Eliminated {
     ArticulatedInertia<S> Y;
-    Force<S> p;
+    Force<S> p;  ///< in the end the joint load
   };
   struct GeneralWork {
     bool free = false;  ///< a floating joint without rotors: P = 1
@@ -411,7 +420,7 @@ class ArticulatedBody {
         const Motion<S>& a_parent = body.parent >= 0 ? body_[body.parent].v : ground;
         if constexpr (is_general<J>) {
           Motion<S> a = pose_[n] * a_parent;
-          if constexpr (with_loads) w.U = load(n, a);
+          if constexpr (with_loads) eliminated_[n].p = load(n, a);
           const GeneralWork& general = general_body_[body.general];
           if (general.free) {
             accelerate_free(body, a, du);
@@ -434,7 +443,7 @@ class ArticulatedBody {
           du[body.v] = rate;
           J::add_rate(a, k.pitch, rate);
           store(w.v, a);
-          if constexpr (with_loads) store(w.U, joint_load);
+          if constexpr (with_loads) store(eliminated_[n].p, joint_load);
         }
       }
     });
@@ -446,7 +455,11 @@ class ArticulatedBody {
     return w;
   }
   LW_INLINE Force<S> planar_load(int n, const Motion<S>& a) const {
-    const Eliminated& e = eliminated_[n];
+    Force<S> w = planar(eliminated_[n]) * a;
+    w += eliminated_[n].p;
+    return w;
+  }
+  LW_INLINE static PlanarInertia<S> planar(const Eliminated& e) {
     PlanarInertia<S> Z;
     Z.A = e.Y.A;
 #pragma GCC unroll 6
@@ -454,31 +467,36 @@ class ArticulatedBody {
     Z.xx = e.Y.C.m[0];
     Z.xy = e.Y.C.m[1];
     Z.yy = e.Y.C.m[2];
-    Force<S> w = Z * a;
-    w += e.p;
-    return w;
+    return Z;
   }
 
   void accelerate_general(const SweepInput<S>& in, const BodyTopology& body, Motion<S>& a, S* du) {
     const GeneralState<S>& g = general_[body.general];
     const GeneralWork& w = general_body_[body.general];
     S y[6];
-    for (int i = 0; i < g.n; ++i) {
-      S t = w.u[i] - dot(a, w.U[i]);
-      for (int l = 0; l < i; ++l) t = t - w.L[6 * i + l] * y[l];
-      y[i] = t * w.L[7 * i];
-    }
-    for (int i = g.n - 1; i >= 0; --i) {
-      S t = y[i];
-      for (int l = i + 1; l < g.n; ++l) t = t - w.L[6 * l + i] * y[l];
-      y[i] = t * w.L[7 * i];
-    }
+    for (int i = 0; i < g.n; ++i) y[i] = w.u[i] - dot(a, w.U[i]);
+    solve_general(g.n, w, y);
     for (int i = 0; i < g.n; ++i) {
       du[g.dof[i]] = y[i];
       a += Motion<S>{y[i] * g.P[i].lin, y[i] * g.P[i].ang};
     }
     copy_prescribed(*model_, body, in, du);
   }
+
+  /// D^-1 y.
+  static void solve_general(int n, const GeneralWork& w, S* y) {
+    for (int i = 0; i < n; ++i) {
+      for (int l = 0; l < i; ++l) y[i] = y[i] - w.L[6 * i + l] * y[l];
+      y[i] = y[i] * w.L[7 * i];
+    }
+    for (int i = n - 1; i >= 0; --i) {
+      for (int l = i + 1; l < n; ++l) y[i] = y[i] - w.L[6 * l + i] * y[l];
+      y[i] = y[i] * w.L[7 * i];
+    }
+  }
+
+  void rest(const SweepInput<S>& in);
+  void tip_to_base_again(const SweepInput<S>& in);
 
   const Model* model_;
   std::vector<BodyWork> body_;
@@ -494,3 +512,5 @@ class ArticulatedBody {
 };
 
 }  // namespace linkwise
+
+#include "linkwise/dynamics/articulated_response.hpp"

@@ -90,7 +90,7 @@ class ArticulatedPaths {
     plain_.base_to_tip(in, paths_.outer, du, loads);
     if (loads) {
       for (Group& group : groups_)
-        group.for_bodies([&](int k, int l, int n) { plain_.body(n).U = group.load(k, l); });
+        group.for_bodies([&](int k, int l, int n) { plain_.joint_load(n) = group.load(k, l); });
       plain_.store_loads(in, loads);
     }
     return plain_.failed_body() < 0;

@@ -33,6 +33,38 @@ struct BatchEvaluator::Work {
     return failed;
   }
 
+  template <class Scalar, class OnLanes>
+  int loads_by_cause(std::unique_ptr<Scalar>& scalar, std::unique_ptr<OnLanes>& on_lanes,
+                     size_t count, const BatchInput& in, std::span<const Cause> causes,
+                     double* loads) {
+    int failed = -1;
+    const size_t stride = causes.size() * n_load();
+    over_groups(
+        count, in,
+        [&](const SweepInput<double>& one, size_t i) {
+          std::vector<double> none(nv()), du(nv());
+          const double* passive = in.passive ? in.passive + i * nv() : nullptr;
+          size_t c = 0;
+          const auto out = [&] { return loads + i * stride + c * n_load(); };
+          if (!each_alone(made(scalar), one, passive, none.data(), causes, du.data(), out,
+                          [&] { ++c; }))
+            failed = scalar->failed_body();
+        },
+        [&](const SweepInput<Group>& group, size_t i) {
+          none_.resize(nv());
+          const Group* passive = pack(passive_, in.passive, nv(), i, count);
+          size_t c = 0;
+          const auto store = [&] {
+            unpack(out_b(), n_load(), i, count, loads + c++ * n_load(), stride);
+          };
+          if (!each_alone(
+                  made(on_lanes), group, passive, none_.data(), causes, out_a(),
+                  [&] { return out_b(); }, store))
+            failed = on_lanes->failed_body();
+        });
+    return failed;
+  }
+
   void inverse_dynamics(size_t count, const BatchInput& in, double* tau, double* loads) {
     over_groups(
         count, in,
@@ -86,9 +118,46 @@ struct BatchEvaluator::Work {
     return to.data();
   }
   void unpack(const Group* from, size_t n, size_t i, size_t count, double* to) {
+    unpack(from, n, i, count, to, n);
+  }
+  void unpack(const Group* from, size_t n, size_t i, size_t count, double* to, size_t stride) {
     const int lanes = static_cast<int>(std::min<size_t>(native_lanes, count - i));
     for (int l = 0; l < lanes; ++l)
-      for (size_t k = 0; k < n; ++k) to[(i + l) * n + k] = from[k][l];
+      for (size_t k = 0; k < n; ++k) to[(i + l) * stride + k] = from[k][l];
+  }
+
+  /// The part of `all` that one cause is; none: no torques.
+  template <class S>
+  static SweepInput<S> alone(Cause cause, const SweepInput<S>& all, const S* passive,
+                             const S* none) {
+    SweepInput<S> in;
+    in.q = all.q;
+    in.tau = none;
+    in.gravity_factor = 0;
+    if (cause == Cause::gravity) in.gravity_factor = all.gravity_factor;
+    if (cause == Cause::velocity) in.v = all.v;
+    if (cause == Cause::drive && all.tau) in.tau = all.tau;
+    if (cause == Cause::motion) in.prescribed = all.prescribed;
+    if (cause == Cause::passive && passive) in.tau = passive;
+    if (cause == Cause::external) in.external = all.external;
+    return in;
+  }
+
+  /// Loads of each cause into out(), after which done() is called. False: not positive definite.
+  template <class Kernel, class S, class Out, class Done>
+  static bool each_alone(Kernel& kernel, const SweepInput<S>& all, const S* passive, const S* none,
+                         std::span<const Cause> causes, S* du, Out&& out, Done&& done) {
+    bool eliminated = false;
+    for (const Cause cause : causes) {
+      const SweepInput<S> in = alone(cause, all, passive, none);
+      if (eliminated)
+        kernel.evaluate_again(in, du, out());
+      else if (!kernel.evaluate(in, du, out()))
+        return false;
+      eliminated = true;
+      done();
+    }
+    return true;
   }
 
   template <class One, class Several>
@@ -121,7 +190,7 @@ struct BatchEvaluator::Work {
   const Model* model_;
   std::unique_ptr<InverseDynamics<double>> inverse_;
   std::unique_ptr<InverseDynamics<Group>> inverse_lanes_;
-  std::vector<Group> q_, v_, tau_, du_, external_, out_a_, out_b_;
+  std::vector<Group> q_, v_, tau_, du_, external_, passive_, none_, out_a_, out_b_;
 };
 
 BatchEvaluator::BatchEvaluator(const Model& model) : work_(std::make_unique<Work>(model)) {}
@@ -133,6 +202,15 @@ int BatchEvaluator::forward_dynamics(size_t count, const BatchInput& in, double*
   return method == BatchMethod::constraint_force
              ? w.forward_dynamics(w.elimination, w.elimination_lanes, count, in, du, loads)
              : w.forward_dynamics(w.articulated, w.articulated_lanes, count, in, du, loads);
+}
+
+int BatchEvaluator::loads_by_cause(size_t count, const BatchInput& in,
+                                   std::span<const Cause> causes, double* loads,
+                                   BatchMethod method) {
+  Work& w = *work_;
+  return method == BatchMethod::constraint_force
+             ? w.loads_by_cause(w.elimination, w.elimination_lanes, count, in, causes, loads)
+             : w.loads_by_cause(w.articulated, w.articulated_lanes, count, in, causes, loads);
 }
 
 void BatchEvaluator::inverse_dynamics(size_t count, const BatchInput& in, double* tau,

@@ -2,6 +2,7 @@
 // Many states of one model: groups of native_lanes systems in SIMD lanes, the rest one by one. The
 // grouping depends on the count alone, so results do not depend on who computes which group.
 #include <memory>
+#include <span>
 
 #include "linkwise/model/model.hpp"
 
@@ -12,13 +13,17 @@ struct BatchInput {
   const double* q = nullptr;
   const double* v = nullptr;
   const double* tau = nullptr;       ///< forward dynamics
-  const double* du = nullptr;        ///< inverse dynamics
+  const double* du = nullptr;        ///< inverse dynamics; prescribed ones: forward dynamics
   const double* external = nullptr;  ///< [n_joints][6] a system
   double gravity_factor = 1;
+  const double* passive = nullptr;  ///< loads by cause: the part of the torques that is no drive's
 };
 
 /// The methods that run on lanes.
 enum class BatchMethod { articulated_body, constraint_force };
+
+/// What alone loads the joints while the mechanism gives way to it.
+enum class Cause { gravity, velocity, drive, motion, passive, external };
 
 /// One worker's scratch: everything is allocated at the first use of its kind.
 class BatchEvaluator {
@@ -30,6 +35,11 @@ class BatchEvaluator {
   /// elimination failed, or -1.
   int forward_dynamics(size_t count, const BatchInput& in, double* du, double* loads,
                        BatchMethod method = BatchMethod::articulated_body);
+
+  /// loads [count][causes][n_joints][6]: every system is eliminated once and solved for each cause.
+  /// The shares of all causes add up to the loads of forward dynamics under tau + passive.
+  int loads_by_cause(size_t count, const BatchInput& in, std::span<const Cause> causes,
+                     double* loads, BatchMethod method = BatchMethod::articulated_body);
 
   /// tau [count][nv] and loads [count][n_joints][6]; either may be null.
   void inverse_dynamics(size_t count, const BatchInput& in, double* tau, double* loads);

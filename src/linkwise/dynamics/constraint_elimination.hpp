@@ -58,9 +58,9 @@ class ConstraintElimination {
   }
 
   /// The same at the q of the last evaluate(), which succeeded, with its factors.
-  void evaluate_again(const SweepInput<S>& in, S* du, S* loads, S* forces = nullptr) {
+  void evaluate_again(const SweepInput<S>& in, S* du, S* loads) {
     sweep<true>(in, du);
-    finish(in, du, loads, forces);
+    finish(in, du, loads, nullptr);
   }
 
   int failed_body() const { return failed_body_; }

@@ -10,36 +10,6 @@
 namespace linkwise::testing {
 namespace {
 
-/// Joints of one axis in chains, trees and on one body, every second pair with a rotor; screws of
-/// either hand, and one that does not advance.
-std::vector<Machine> one_axis_machines() {
-  using enum JointType;
-  std::vector<Machine> all;
-  Draws draws(81);
-  const auto add = [&](const std::string& name, const std::vector<JointType>& kinds, int n,
-                       const std::vector<int>& parents) {
-    std::vector<JointType> types(n);
-    for (int i = 0; i < n; ++i) types[i] = kinds[i % kinds.size()];
-    ModelSpec spec = tree_spec(types, parents, draws);
-    if (kinds[0] == helical) spec.joints.back().axes[0].pitch = 0;
-    all.push_back({name, spec});
-    for (int i = 0; i < n; ++i)
-      if (i % 4 < 2) spec.joints[i].dof.push_back({DofProperty::armature, {0.1 + 0.2 * i}});
-    all.push_back({name + "_geared", spec});
-    spec.floating_base = true;
-    all.push_back({name + "_floating", spec});
-  };
-  const std::vector<JointType> mixed{helical, prismatic, revolute, prismatic, helical};
-  for (const auto& [name, kinds] : {std::pair{"slides", std::vector{prismatic}},
-                                    {"screws", std::vector{helical}},
-                                    {"mixed_axes", mixed}}) {
-    add(std::string(name) + "_chain", kinds, 11, chain_parents(11));
-    add(std::string(name) + "_tree", kinds, 14, random_parents(14, draws));
-    add(std::string(name) + "_on_one_body", kinds, 7, {-1, 0, 0, 0, 0, 0, 0});
-  }
-  return all;
-}
-
 std::vector<Machine> machines_to_eliminate() {
   std::vector<Machine> all = regular_machines();
   for (Machine& machine : one_axis_machines()) all.push_back(std::move(machine));
@@ -82,32 +52,6 @@ TEST_P(Eliminations, EqualTheRecursion) {
   ASSERT_TRUE(fused.evaluate(c.input(), du.data(), loads.data()));
   expect_close(du, want, 1e-10, "accelerations");
   expect_close(loads, want_loads, 1e-10, "loads");
-}
-
-// The factors of one evaluation serve any other right-hand side at the same position.
-TEST_P(Eliminations, AgainEqualAnew) {
-  const Model model(GetParam().spec);
-  ConstraintElimination<double> kept(model), anew(model);
-  const DynamicsCase first(model, 56), other(model, 57);
-  const std::vector<double> none(model.nv());
-  std::vector<double> du(model.nv(), NAN), loads(6 * model.n_joints(), NAN),
-      f(kept.n_unknowns(), NAN), want(du), want_loads(loads), want_f(f);
-  ASSERT_TRUE(kept.evaluate(first.input(), du.data(), nullptr));
-  for (const char* cause : {"all", "rest", "gravity", "velocity", "motion", "external"}) {
-    const std::string only = cause;
-    SweepInput<double> in = other.input();
-    in.q = first.state.q.data();
-    if (only != "all" && only != "velocity") in.v = nullptr;
-    if (only != "all") in.tau = none.data();
-    if (only != "all" && only != "motion") in.prescribed = nullptr;
-    if (only != "all" && only != "external") in.external = nullptr;
-    if (only != "all" && only != "gravity") in.gravity_factor = 0;
-    ASSERT_TRUE(anew.evaluate(in, want.data(), want_loads.data(), want_f.data()));
-    kept.evaluate_again(in, du.data(), loads.data(), f.data());
-    expect_close(du, want, 1e-13, only + ", accelerations");
-    expect_close(loads, want_loads, 1e-13, only + ", loads");
-    expect_close(f, want_f, 1e-13, only + ", forces");
-  }
 }
 
 TEST_P(Eliminations, OnLanesEqualOneByOne) {

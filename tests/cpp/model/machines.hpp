@@ -9,6 +9,7 @@
 #include <ostream>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/draws.hpp"
@@ -239,6 +240,36 @@ inline std::vector<Machine> all_machines() {
   Draws draws(seed++);
   for (Machine& machine : axis_geometries(draws)) all.push_back(std::move(machine));
   for (Machine& machine : special_machines(draws)) all.push_back(std::move(machine));
+  return all;
+}
+
+/// Joints of one axis in chains, trees and on one body, every second pair with a rotor; screws of
+/// either hand, and one that does not advance.
+inline std::vector<Machine> one_axis_machines() {
+  using enum JointType;
+  std::vector<Machine> all;
+  Draws draws(81);
+  const auto add = [&](const std::string& name, const std::vector<JointType>& kinds, int n,
+                       const std::vector<int>& parents) {
+    std::vector<JointType> types(n);
+    for (int i = 0; i < n; ++i) types[i] = kinds[i % kinds.size()];
+    ModelSpec spec = tree_spec(types, parents, draws);
+    if (kinds[0] == helical) spec.joints.back().axes[0].pitch = 0;
+    all.push_back({name, spec});
+    for (int i = 0; i < n; ++i)
+      if (i % 4 < 2) spec.joints[i].dof.push_back({DofProperty::armature, {0.1 + 0.2 * i}});
+    all.push_back({name + "_geared", spec});
+    spec.floating_base = true;
+    all.push_back({name + "_floating", spec});
+  };
+  const std::vector<JointType> mixed{helical, prismatic, revolute, prismatic, helical};
+  for (const auto& [name, kinds] : {std::pair{"slides", std::vector{prismatic}},
+                                    {"screws", std::vector{helical}},
+                                    {"mixed_axes", mixed}}) {
+    add(std::string(name) + "_chain", kinds, 11, chain_parents(11));
+    add(std::string(name) + "_tree", kinds, 14, random_parents(14, draws));
+    add(std::string(name) + "_on_one_body", kinds, 7, {-1, 0, 0, 0, 0, 0, 0});
+  }
   return all;
 }
 

@@ -1,12 +1,15 @@
 """Loads by cause: the shares add up to rounding, and each is what it says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import linkwise as lw
-from helpers.loaded_arm import arm
+from helpers.loaded_arm import arm, profile
 from helpers.machines import G, rod_chain
-from helpers.random_trees import random_configuration
+from helpers.random_trees import JOINT_TYPES, make_tree, random_configuration
+from linkwise import _core
 
 
 @pytest.mark.parametrize("by", ["force", "motion"])
@@ -21,6 +24,135 @@ def test_shares_add_up(swing, by):
     }
     assert shares.cause.values.tolist() == expected[by]
     assert all(np.abs(shares.sel(cause=name)).max() > 1e-3 for name in expected[by])
+
+
+FORCES = ["gravity", "velocity", "drive", "motion", "passive", "external"]
+
+
+def each_alone(model, causes, q, v, tau, external, prescribed):
+    """The slow twin: a whole forward dynamics for every cause."""
+    part = {
+        "gravity": {},
+        "velocity": {"v": v},
+        "drive": {"tau": tau},
+        "motion": {"prescribed": prescribed},
+        "passive": {"tau": lw.passive_torque(model, q, v)},
+        "external": {"external": external},
+    }
+    shares = []
+    for cause in causes:
+        acting = {"v": None, "tau": None, **part[cause]}
+        rest = {"gravity": float(cause == "gravity"), "full": True}
+        shares.append(lw.forward_dynamics(model, q, **acting, **rest).joint_load)
+    return np.stack(shares, axis=-3)
+
+
+def acting_on(model, rng, count):
+    q = random_configuration(model, rng, (count,))
+    v, tau, given = rng.normal(size=(3, count, model.nv))
+    return q, v, tau, rng.normal(size=(count, model.n_joints, 6)), given
+
+
+def mixed_machines(rng):
+    """The arm with every passive force, and trees of all kinds of joints; are some joints given?"""
+    yield arm(), False
+    yield arm().prescribe(["elbow"]), True
+    for seed in range(10):
+        kinds = rng.choice(JOINT_TYPES, size=3 + seed)
+        tree = make_tree(kinds, [int(rng.integers(-1, k)) for k in range(len(kinds))], seed)
+        armatures = rng.uniform(0, 1, len(kinds)) * (rng.random(len(kinds)) < 0.4)
+        joints = (replace(j, armature=a) for j, a in zip(tree.joints, armatures, strict=True))
+        model = replace(tree, joints=tuple(joints)).build()
+        quaternions = ("spherical", "floating")
+        given = [j.name for j in tree.joints[:: 2 + seed % 3] if j.type not in quaternions]
+        held = seed % 2 == 1 and given != []
+        yield (model.prescribe(given) if held else model), held
+
+
+@pytest.mark.parametrize("method", ["articulated_body", "constraint_force"])
+@pytest.mark.parametrize("count", [1, 2, 9])
+def test_one_factorisation_gives_what_each_cause_alone_gives(method, count, rng):
+    for model, is_held in mixed_machines(rng):
+        q, v, tau, external, given = acting_on(model, rng, count)
+        held = {"prescribed": given} if is_held else {}
+        causes = FORCES if held else [name for name in FORCES if name != "motion"]
+        acting = {"external": external, **held}
+        shares = _core.joint_loads_by_cause(model, causes, q, v, tau, method=method, **acting)
+        expected = each_alone(model, causes, q, v, tau, external, given)
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(shares, expected, atol=1e-10 * scale, rtol=0)
+        whole = lw.forward_dynamics(model, q, v, tau, passive=True, full=True, **acting)
+        total = shares.sum(axis=-3)
+        np.testing.assert_allclose(total, whole.joint_load, atol=1e-10 * scale, rtol=0)
+
+
+@pytest.mark.parametrize("threads", [2, 3, 7])
+def test_threads_change_no_bit_of_a_share(threads, rng):
+    model = arm()
+    q, v, tau, external, _ = acting_on(model, rng, 701)
+    causes = ["gravity", "velocity", "drive", "passive", "external"]
+
+    def by_cause(**options):
+        return _core.joint_loads_by_cause(model, causes, q, v, tau, external=external, **options)
+
+    one = by_cause(threads=1)
+    assert one.shape == (701, 5, model.n_joints, 6)
+    assert (by_cause(threads=threads) == one).all()
+
+
+def test_a_body_without_inertia_about_its_axis_splits_too(rng):
+    """Its joint's constraint-force system has no A; the recursion needs none."""
+    builder = lw.ModelBuilder("wire")
+    builder.add_link("base")
+    builder.add_link("bead", mass=2.0, com=(0.3, 0, 0))
+    builder.add_joint("hinge", "revolute", "base", "bead", axis=(0, 1, 0))
+    model = builder.build()
+    q, v, tau = rng.normal(size=(3, 4, 1))
+    shares = _core.joint_loads_by_cause(model, ["gravity", "velocity", "drive"], q, v, tau)
+    np.testing.assert_allclose(shares.sum(axis=1), lw.joint_loads(model, q, v, tau), atol=1e-12)
+    with pytest.raises(lw.InputError, match=r"bead.*singular inertia"):
+        _core.joint_loads_by_cause(model, ["gravity"], q, v, method="constraint_force")
+
+
+def test_causes_by_unknown_names_and_methods_are_refused():
+    q = np.zeros(3)
+    with pytest.raises(lw.InputError, match=r"cause 'weight' is unknown; known: gravity, vel"):
+        _core.joint_loads_by_cause(arm(), ["weight"], q, None)
+    with pytest.raises(lw.InputError, match="'thomas' does not split loads; use"):
+        _core.joint_loads_by_cause(arm(), ["gravity"], q, None, method="thomas")
+    with pytest.raises(lw.InputError, match=r"use model.prescribe"):
+        _core.joint_loads_by_cause(arm(), ["motion"], q, None, prescribed=q)
+    with pytest.raises(lw.InputError, match=r"do not broadcast: q \(2, 3\), v \(4, 3\)"):
+        _core.joint_loads_by_cause(arm(), ["gravity"], np.zeros((2, 3)), np.zeros((4, 3)))
+
+
+@pytest.mark.parametrize(
+    ("gravity", "drives", "by_force", "by_motion"),
+    [
+        ((0, 0, -9.81), {"elbow": 1.0}, "gravity velocity drive", "gravity velocity acceleration"),
+        ((0, 0, 0), {"elbow": 1.0}, "velocity drive", "velocity acceleration"),
+        ((0, 0, -9.81), {}, "gravity velocity", "gravity velocity acceleration"),
+        ((0, 0, 0), {"elbow": lw.Free()}, "velocity", "velocity acceleration"),
+        ((0, 0, 0), {"elbow": "motion"}, "velocity motion", "velocity acceleration"),
+        ((0, 0, -9.81), "locked", "gravity", "gravity"),
+        ((0, 0, 0), "locked", "", ""),
+    ],
+)
+def test_causes_that_cannot_happen_are_left_out(gravity, drives, by_force, by_motion):
+    machine = arm(gravity=gravity)
+    if drives == "locked":
+        drives = dict.fromkeys(machine.joint_names, lw.Locked())
+    elif drives.get("elbow") == "motion":
+        drives = {"elbow": lw.Motion(profile(0.3, 0.2))}
+    run = lw.simulate(machine, duration=0.1, every=0.05, drives=drives)
+    for by, names in (("force", by_force), ("motion", by_motion)):
+        shares = lw.loads.split(run, by)
+        found = [name for name in shares.cause.values.tolist() if name != "passive"]
+        assert found == names.split()
+        total = shares.sum("cause").transpose(*run.joint_load.dims)
+        np.testing.assert_allclose(total, run.joint_load, atol=1e-10)
+    locked = drives.get("wrist") == lw.Locked()
+    assert ("passive" in lw.loads.split(run).cause.values) == (not locked)
 
 
 @pytest.mark.parametrize("solver", ["thomas", "conjugate_gradient"])
