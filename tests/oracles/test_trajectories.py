@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+import linkwise as lw
 from helpers.machines import babyboot, free_body, pendulum, rod_chain, rod_tip
 from helpers.motion import final_state, simulate
 
@@ -166,3 +167,11 @@ def test_errors_of_the_babyboot_grow_as_its_disturbances_do(method):
         assert np.all(error <= 10 * tolerance * sensitivity), (error / tolerance, sensitivity)
     np.testing.assert_allclose(BABYBOOT[-1], BABYBOOT_PUBLISHED, rtol=0, atol=3e-8)
     np.testing.assert_allclose(angles(1e-13)[-1], BABYBOOT_PUBLISHED, rtol=0, atol=1e-6)
+
+
+def test_the_babyboot_keeps_its_energy():
+    """To the 7e-13 J of the published run."""
+    model = babyboot()
+    _, q, v = simulate(model, 10.0, every=0.1, q0=BABYBOOT_START, tolerance=1e-13)
+    energy = lw.kinetic_energy(model, q, v) + lw.potential_energy(model, q)
+    assert np.abs(energy - energy[0]).max() < 7e-13
