@@ -24,6 +24,11 @@ def shorten(text: object, limit: int = _SHOWN_CHARACTERS) -> str:
     return line if len(line) <= limit else line[: limit - 3] + "..."
 
 
+def file_name(path: str | os.PathLike[str]) -> str:
+    """``path`` as text: names of files may hold bytes that are none."""
+    return os.fspath(path).encode("utf-8", "replace").decode("utf-8")
+
+
 def near(name: str, known: Iterable[str], kind: str = "known") -> str:
     """``did you mean 'elbow'?`` for the nearest known name, otherwise a list of some of them."""
     names = list(known)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError, Model, ModelBuilder
-from linkwise.io.complaint import complain, shorten
+from linkwise.io.complaint import complain, file_name, shorten
 
 Array = npt.NDArray[np.float64]
 KINDS = ("floating", "spherical", "prismatic", "revolute")
@@ -40,8 +40,8 @@ def read_mjcf(
     names = Names(mj_model)
     if gravity is None:
         gravity = tuple(mj_model.opt.gravity) if _enabled(mj_model, "GRAVITY") else (0, 0, 0)
-    stem = os.path.splitext(os.path.basename(os.fspath(path)))[0]
-    builder = ModelBuilder(stem, gravity=gravity, source=os.fspath(path))
+    stem = os.path.splitext(os.path.basename(file_name(path)))[0]
+    builder = ModelBuilder(stem, gravity=gravity, source=file_name(path))
     try:
         _add_bodies(builder, mj_model, names)
         for level, element, text in [*_ignored(mj_model), *_joint_notes(mj_model, names)]:
@@ -59,6 +59,9 @@ def compile_mjcf(path: str | os.PathLike[str]) -> Any:
         complain(
             path, "model file", "MJCF needs the package mujoco", "pip install 'linkwise[mjcf]'"
         )
+    if file_name(path) != os.fspath(path):
+        problem = "its name is not UTF-8, which MuJoCo cannot open"
+        complain(path, "model file", problem, "rename it")
     # Without a handler MuJoCo prints warnings and appends them to a file in the working directory.
     previous = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda message: None)

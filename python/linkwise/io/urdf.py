@@ -17,7 +17,7 @@ import numpy.typing as npt
 from lxml import etree
 
 from linkwise._core import InputError, Model, ModelBuilder
-from linkwise.io.complaint import complain, shorten
+from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.urdf_checks import CheckedUrdf, check_urdf
 from linkwise.io.urdf_tree import JointOrder, check_tree, order_joints
 
@@ -47,7 +47,7 @@ def read_urdf(
     if mimic == "error" and checked.mimics:
         _refuse_mimic(checked)
     robot = _parse_clean(checked)
-    builder = ModelBuilder(checked.name, gravity=gravity, source=os.fspath(path))
+    builder = ModelBuilder(checked.name, gravity=gravity, source=file_name(path))
     for link in robot.links:
         _add_link(builder, link, checked)
     for index in order_joints(checked.joints, root_link, joint_order):

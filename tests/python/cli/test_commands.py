@@ -1,6 +1,7 @@
 """What the commands print, write and return."""
 
 import os
+import sys
 
 import numpy as np
 import pytest
@@ -130,6 +131,15 @@ def test_run_writes_results_named_like_the_scenario(linkwise, scenario):
     assert float(run.position.sel(joint="elbow")[0]) == 0.3
     assert np.all(run.velocity.sel(joint="slide") == 0)
     assert linkwise("run", scenario(), "--json").json["run"] == "swing-2.zarr"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are text elsewhere")
+def test_names_of_files_may_be_no_text(linkwise, arm):
+    name = os.fsdecode(b"arm\xe9.urdf")
+    arm.rename(name)
+    result = linkwise("inspect", name)
+    assert result.code == 0
+    assert result.out.startswith("arm (arm?.urdf): ")
 
 
 FREE = (('kind = "locked"', 'kind = "free"'), ("duration = 0.5", "duration = 2"))
