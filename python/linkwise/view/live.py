@@ -52,7 +52,7 @@ class View:
         self._wishes = Wishes(redraw=True)
         self._joint = 0
         self._sample = -1
-        self._told = 0.0
+        self._told = self._drawn = 0.0
         server.gui.add_html(headline(source))
         self.scene = Scene(server, source)
         recording = source.recording
@@ -151,11 +151,12 @@ class View:
         if not (moved or forced):
             return
         sample = sample_at(recording.times, playback.time)
-        if sample != self._sample or forced:
-            self._sample = sample
+        now = clock.monotonic()
+        due = forced or not playback.playing or now - self._drawn > self.scene.drawing_time
+        if due and (sample != self._sample or forced):
+            self._sample, self._drawn = sample, now
             loads = recording.load(sample) if recording.has_loads else None
             self.scene.show(self.scene.at(recording.position(sample), loads))
-        now = clock.monotonic()
         if forced or not playback.playing or now - self._told > _PLOT_INTERVAL:
             self._told = now
             self._controls.show()

@@ -127,17 +127,21 @@ class Marks:
 
 @dataclass
 class Loads:
-    """Arrows of forces (half 0) or arcs of moments (half 1) at the joint points."""
+    """Arrows of forces (half 0) or arcs of moments (half 1) at the points of these joints."""
 
     half: int
     style: LoadStyle
+    joints: Indices
 
     def __call__(self, moment: Moment) -> dict[str, Any]:
         if moment.loads is None:
             return {}
-        vectors = in_world(moment.joints, moment.loads)[self.half]
-        use = None if self.style.use is None else self.style.use.of(moment.loads, self.half)
-        points = moment.joints[:, :3, 3]
+        frames = moment.joints[self.joints]
+        vectors = in_world(frames, moment.loads[self.joints])[self.half]
+        use = None
+        if self.style.use is not None:
+            use = self.style.use.of(moment.loads, self.half)[self.joints]
+        points = frames[:, :3, 3]
         made = instances(points, vectors, self.style.largest[self.half], self.style.longest, use)
         return {
             "batched_positions": made.positions,
@@ -147,7 +151,7 @@ class Loads:
         }
 
     def plan(self) -> dict[str, Any]:
-        return {"kind": "loads", "half": self.half}
+        return {"kind": "loads", "half": self.half, "joints": self.joints}
 
 
 @dataclass

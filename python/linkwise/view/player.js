@@ -123,17 +123,20 @@
     marks: ({points}) => ({batched_positions: points}),
 
     loads(moment, layer, style) {
-      const {poses, points, loads} = moment, half = layer.half, n = points.length / 3;
+      const {poses, loads} = moment, {half, joints} = layer, n = joints.length;
+      const points = new Float32Array(3 * n);
       const wxyzs = new Float32Array(4 * n), scales = new Float32Array(n);
       const colors = new Uint8Array(3 * n);
       const largest = style.largest[half];
       const uses = style.byRating ? ratingUse(loads, half, style.rating) : null;
       for (let k = 0; k < n; k++) {
-        const [a, b, c] = [0, 1, 2].map(i => loads[6 * k + 3 * half + i]);
+        const joint = joints[k];
+        const [a, b, c] = [0, 1, 2].map(i => loads[6 * joint + 3 * half + i]);
         const size = Number.isFinite(a + b + c) ? Math.hypot(a, b, c) : 0;
         const share = largest > 0 ? size / largest : 0;
+        for (let i = 0; i < 3; i++) points[3 * k + i] = poses[7 * joint + i];
         if (size > 0) {
-          const q = 7 * k + 3;
+          const q = 7 * joint + 3;
           const [x, y, z] = turn(poses[q], poses[q + 1], poses[q + 2], poses[q + 3],
             a / size, b / size, c / size);
           turnZTo(wxyzs, k, x, y, z);
@@ -142,9 +145,9 @@
         }
         scales[k] = style.longest * Math.max(share, NOTHING);
         if (!uses) mix(colors, k, style.colors.size, share);
-        else if (Number.isNaN(uses[k])) colors.set(style.colors.unrated, 3 * k);
-        else if (uses[k] > 1) colors.set(style.colors.overloaded, 3 * k);
-        else mix(colors, k, style.colors.use, uses[k]);
+        else if (Number.isNaN(uses[joint])) colors.set(style.colors.unrated, 3 * k);
+        else if (uses[joint] > 1) colors.set(style.colors.overloaded, 3 * k);
+        else mix(colors, k, style.colors.use, uses[joint]);
       }
       return {batched_positions: points, batched_wxyzs: wxyzs, batched_scales: scales,
         batched_colors: colors};

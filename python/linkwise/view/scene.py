@@ -44,6 +44,8 @@ _TONES = np.array([[86, 112, 140], [150, 170, 190]], dtype=np.uint8)
 _ROD_TONE, _MARK_TONE, _BOX_TONE = (120, 132, 146), (52, 58, 66), (230, 150, 60)
 _PLAIN = (0.62, 0.66, 0.70, 1.0)
 _MANY = 1500  # joints, above which marks at every joint only hide the links
+_SPARSE_LOADS, _SPARSE_POINTS = 60, 300  # of a machine with more: what a processor draws in time
+_INSTANCES_A_SECOND = 500_000  # that viser's client takes in
 _ARROW_SHARE = 0.22  # of the machine's size: the largest load's arrow
 
 
@@ -67,6 +69,7 @@ class Scene:
         self._scene = server.scene
         self._model = model = source.model
         self._inboard = np.array(model.joint_parents, dtype=int)
+        self._few = model.n_joints <= _MANY
         self.layers: dict[str, list[Layer]] = defaultdict(list)
         self.joint_marks: Any = None
         start = model.neutral_configuration()
@@ -79,7 +82,9 @@ class Scene:
         self._add_looks(source)
         self._add_shapes(bare="Meshes" not in self.toggles)
         if source.recording is None or source.recording.has_loads:
-            self._add_loads(shown=source.recording is not None)
+            shown = source.recording is not None
+            peaks = source.recording.peaks if source.recording else np.zeros(model.n_joints)
+            self._add_loads(shown=shown, peaks=peaks)
         self._frame_camera(server)
         for name, shown in self.toggles.items():
             self.toggle(name, shown)
@@ -102,6 +107,17 @@ class Scene:
         for layer in self.layers[name]:
             layer.handle.visible = shown
             layer.show(self._moment)
+
+    @property
+    def drawing_time(self) -> float:
+        """Seconds to leave a client between two moments: more often, and they would queue there."""
+        shown = sum(
+            len(layer.handle.batched_positions)
+            for layers in self.layers.values()
+            for layer in layers
+            if layer.handle.visible and hasattr(layer.handle, "batched_positions")
+        )
+        return shown / _INSTANCES_A_SECOND
 
     def set_arrow_scale(self, scale: float) -> None:
         """Draw arrows and arcs this many times as long as by default."""
@@ -176,6 +192,7 @@ class Scene:
     def _add_shapes(self, *, bare: bool) -> None:
         """Boxes from the inertias, rods between joint points, marks at joints."""
         model, inboard = self._model, self._inboard
+        few, links = self._few, "Bodies" if self._few else "Every link"
         boxes = equivalent_boxes(model.link_masses, model.link_inertias)
         offsets = np.tile(np.eye(4), (len(boxes.edges), 1, 1))
         offsets[:, :3, :3] = boxes.axes
@@ -183,7 +200,7 @@ class Scene:
         solid = np.flatnonzero(boxes.edges.max(axis=1, initial=0.0) > 0)
         near = solid[_stays_near(self._moment, model, boxes.edges, offsets)[solid]]
         for toggle, chosen, shown, style in (
-            ("Bodies", near, bare, {"batched_colors": _TONES[near % 2]}),
+            (links, near, bare and few, {"batched_colors": _TONES[near % 2]}),
             ("Inertia boxes", solid, False, {"batched_colors": _BOX_TONE, "opacity": 0.35}),
         ):
             if chosen.size:
@@ -192,29 +209,30 @@ class Scene:
                     toggle, shown, unit_box(), chosen.size, batched_scales=edges, **style
                 )
                 self.layers[toggle].append(Layer(handle, Following(chosen, offsets[chosen])))
-        few = model.n_joints <= _MANY
         outboard = np.flatnonzero(inboard >= 0)
         thick = self._thickness()
         if outboard.size:
             handle = self._add(
-                "Bodies",
-                bare,
+                links,
+                bare and few,
                 unit_cylinder(8) if few else turned([(1, -0.5), (1, 0.5)], 4),
                 outboard.size,
                 batched_scales=np.ones((outboard.size, 3)),
                 batched_colors=_ROD_TONE,
             )
             rods = Spanning(inboard[outboard], outboard, 0.55 * thick)
-            self.layers["Bodies"].append(Layer(handle, rods))
+            self.layers[links].append(Layer(handle, rods))
         if not few:  # lines keep their width on the screen, however far away they are
+            ends = _sparse_tree(inboard, _SPARSE_POINTS)
             lines = self._scene.add_line_segments(
                 "/bodies/lines",
-                points=np.zeros((outboard.size, 2, 3)),
+                points=np.zeros((len(ends[0]), 2, 3)),
                 colors=_ROD_TONE,
                 thickness=2.5,
                 thickness_units="screen",
             )
-            self.layers["Bodies"].append(Layer(lines, Lines(inboard[outboard], outboard)))
+            self.toggles["Bodies"] = bare
+            self.layers["Bodies"].append(Layer(lines, Lines(*ends)))
         self.joint_marks = self._add(
             "Joints",
             bare and few,
@@ -235,23 +253,34 @@ class Scene:
 
     # -- loads ------------------------------------------------------------------------------
 
-    def _add_loads(self, *, shown: bool) -> None:
-        few = self._model.n_joints <= _MANY
-        for half, (toggle, mesh) in enumerate(
-            (
-                ("Forces", unit_arrow(10 if few else 5)),
-                ("Moments", unit_arc(*((6, 28) if few else (3, 12)))),
-            )
-        ):
+    def _add_loads(self, *, shown: bool, peaks: Array) -> None:
+        """Arrows and arcs; of large machines at joints here and there and at the most loaded one,
+        and, unless switched on, hidden ones at every joint.
+        """
+        every = np.arange(self._model.n_joints)
+        arrow, arc = unit_arrow(10), unit_arc(6, 28)
+        if not self._few:
+            here = np.linspace(0, every.size - 1, _SPARSE_LOADS).astype(int)
+            here = np.unique([*here, int(np.argmax(peaks))])
+            arrow, arc = unit_arrow(3), unit_arc(3, 8)
+            self._add_load_layers("Forces", "Moments", (arrow, arc), here, shown)
+            self._add_load_layers("Every force", "Every moment", (arrow, arc), every, False)
+        else:
+            self._add_load_layers("Forces", "Moments", (arrow, arc), every, shown)
+
+    def _add_load_layers(
+        self, forces: str, moments: str, meshes: tuple[Mesh, Mesh], joints: Any, shown: bool
+    ) -> None:
+        for half, (toggle, mesh) in enumerate(zip((forces, moments), meshes, strict=True)):
             handle = self._add(
                 toggle,
                 shown,
                 mesh,
-                self._model.n_joints,
-                batched_scales=np.full(self._model.n_joints, 1e-9),
-                batched_colors=np.zeros((self._model.n_joints, 3), dtype=np.uint8),
+                joints.size,
+                batched_scales=np.full(joints.size, 1e-9),
+                batched_colors=np.zeros((joints.size, 3), dtype=np.uint8),
             )
-            self.layers[toggle].append(Layer(handle, Loads(half, self.style)))
+            self.layers[toggle].append(Layer(handle, Loads(half, self.style, joints)))
 
     # -- view -------------------------------------------------------------------------------
 
@@ -285,6 +314,25 @@ class Scene:
         """Height of the grid: the lowest point, or the ground where the machine stands on it."""
         points = np.concatenate([self._moment.links[:, :3, 3], self._moment.joints[:, :3, 3]])
         return min(0.0, float(points[:, 2].min()) - 0.02 * self.size)
+
+
+def _sparse_tree(inboard: Any, most: int) -> tuple[Any, Any]:
+    """Segments (inboard ends, outboard ends) of a tree through about `most` of its joints.
+
+    Kept are joints here and there, tips and the joints where branches part.
+    """
+    n = inboard.size
+    branches = np.bincount(inboard[inboard >= 0], minlength=n)
+    kept = branches != 1
+    if np.count_nonzero(kept) > most:
+        kept[:] = False
+    kept[np.linspace(0, n - 1, most).astype(int)] = True
+    nearest = np.full(n, -1)  # the kept joint at or inboard of each; joints come outward
+    for joint, before in enumerate(inboard):
+        nearest[joint] = joint if kept[joint] else (nearest[before] if before >= 0 else -1)
+    outboard = np.array([k for k in np.flatnonzero(kept) if inboard[k] >= 0], dtype=int)
+    ends = nearest[inboard[outboard]]
+    return ends[ends >= 0], outboard[ends >= 0]
 
 
 def _across(moment: Moment) -> tuple[Array, Array]:
