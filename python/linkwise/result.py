@@ -142,9 +142,11 @@ class Run:
         """
         import xarray as xr
 
+        from linkwise.loads.samples import rows as read_rows
+
         if "joint_load" not in self.dataset:
             raise InputError('run holds no joint loads; record the quantity "joint_load"')
-        load = self.dataset["joint_load"].transpose("time", "joint", "component")
+        load = self.dataset["joint_load"]
         times = self.dataset["time"].values
         if times.size == 0:
             raise InputError("run holds no samples: it stopped before the first was written")
@@ -153,7 +155,8 @@ class Run:
         when = np.zeros((2, count))
         rows = max(1, _BLOCK_BYTES // max(1, 48 * count))
         for start in range(0, times.size, rows):
-            block = load[start : start + rows].values.reshape(-1, count, 2, 3)
+            block = read_rows(self, "joint_load", slice(start, start + rows))
+            block = block.reshape(-1, count, 2, 3)
             size = np.linalg.norm(block, axis=-1)
             at = np.argmax(size, axis=0)
             peak = np.take_along_axis(size, at[None], axis=0)[0].T

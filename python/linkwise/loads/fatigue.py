@@ -128,10 +128,12 @@ def damage_equivalent(
     if not len(exponents) or not all(np.isfinite(m) and m > 0 for m in exponents):
         raise InputError("exponents: give positive numbers, such as 3, 5 and 10")
     times = run.dataset["time"].values
+    if times.size < 2:
+        raise InputError("run holds one sample, and cycles need two; record more, with every=")
     span = float(times[-1] - times[0])
     count = span if repetitions is None else float(repetitions)
     if not count > 0:
-        raise InputError("repetitions: give a positive number; a run of one sample has no cycles")
+        raise InputError("repetitions: give a positive number")
     names = joint_names(run) if joints is None else list(joints)
     where = [joint_position(run, name) for name in names]
     load = rows(run, "joint_load", slice(None))[:, where]

@@ -98,10 +98,29 @@ def blocks(run: Run, row_bytes: int) -> Iterator[slice]:
 
 
 def rows(run: Run, name: str, where: slice | Sequence[int]) -> Array:
-    """A variable's rows as (time, ...) in the model's order."""
+    """A variable's rows as (time, ...) in the model's order.
+
+    Raises InputError where the files are damaged or a joint load is not a number.
+    """
     variable = run.dataset[name]
     last = [dim for dim in variable.dims if dim != "time"]
-    return np.asarray(variable.transpose("time", *last)[where].values, dtype=np.float64)
+    shown = f"run {str(run.path)!r}" if run.path is not None else "run"
+    try:
+        values = variable.transpose("time", *last)[where].values
+    except (RuntimeError, OSError, ValueError) as error:
+        why = " ".join(str(error).split())
+        raise InputError(
+            f"{shown}: {name} cannot be read ({why}); its files are damaged, simulate again"
+        ) from None
+    found = np.asarray(values, dtype=np.float64)
+    if name == "joint_load" and not np.isfinite(found).all():
+        row, joint = np.argwhere(~np.isfinite(found))[0][:2]
+        time = float(run.dataset["time"][where].values[row])
+        raise InputError(
+            f"{shown}: joint_load of joint {joint_names(run)[joint]!r} is not a finite number at "
+            f"{time:g} s; simulate again"
+        )
+    return found
 
 
 def external(run: Run, model: Model, where: slice | Sequence[int]) -> Array | None:

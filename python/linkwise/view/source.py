@@ -13,6 +13,7 @@ import numpy as np
 from linkwise._core import InputError, Model, inverse_dynamics_loads
 from linkwise.io.complaint import near
 from linkwise.io.urdf_visuals import Looks, read_looks
+from linkwise.loads.samples import rows
 from linkwise.scenario import load_ratings, load_scenario, ratings_in
 from linkwise.view.shapes import Array
 from linkwise.view.shown_loads import CauseLoads
@@ -54,7 +55,7 @@ class Recording:
         self.has_loads = loads
         self._check(run, model)
         self.times: Array = np.asarray(run.dataset["time"].values, dtype=float)
-        self._dataset = run.dataset
+        self._run = run
         self._row_bytes = 8 * (model.nq + (6 * model.n_joints if loads else 0))
         self._first = self._last = 0
         self._positions = np.zeros((0, model.nq))
@@ -90,14 +91,13 @@ class Recording:
     def _read(self, sample: int) -> int:
         """Row of `sample` in the block at hand, which is replaced when it is not in there."""
         if not self._first <= sample < self._last:
-            rows = max(1, _BLOCK_BYTES // max(1, self._row_bytes))
-            self._first = sample - sample % rows
-            self._last = min(self._first + rows, self.times.size)
-            block = self._dataset.isel(time=slice(self._first, self._last))
-            self._positions = block["position"].values
+            count = max(1, _BLOCK_BYTES // max(1, self._row_bytes))
+            self._first = sample - sample % count
+            self._last = min(self._first + count, self.times.size)
+            block = slice(self._first, self._last)
+            self._positions = rows(self._run, "position", block)
             if self.has_loads:
-                loads = block["joint_load"].transpose("time", "joint", "component")
-                self._loads = loads.values
+                self._loads = rows(self._run, "joint_load", block)
         return sample - self._first
 
     def position(self, sample: int) -> Array:
@@ -120,7 +120,7 @@ class Recording:
         if self.causes is not None and not self.causes.everything:
             chosen, loads = self.causes.history(joint, chosen)
             return self.times[chosen], loads
-        load = self._dataset["joint_load"].transpose("time", "joint", "component")[:, joint]
+        load = self._run.dataset["joint_load"].transpose("time", "joint", "component")[:, joint]
         return self.times[chosen], np.asarray(load.values[chosen])
 
 

@@ -276,7 +276,7 @@ def test_exported_model_is_a_still(tmp_path, page):
 
 
 FRAME_RATE = """() => new Promise(done => {
-  const drawn = [], ends = performance.now() + 4000;
+  const drawn = [], ends = performance.now() + 2500;
   const count = now => {
     drawn.push(now);
     if (now < ends || drawn.length < 4) requestAnimationFrame(count);

@@ -80,7 +80,7 @@ def test_model_of_another_machine(linkwise, run_path, tmp_path):
         (["--ratings", "wrong.toml"], ["'elbow_pich'", "did you mean 'elbow_pitch'"]),
         (["--ratings", "nowhere.toml"], ["nowhere.toml"]),
         (["--cause", "grvity"], ["'grvity'", "use gravity, velocity"]),
-        (["--cause", "external"], ["'external'", "the run has none; it has gravity, velocity"]),
+        (["--cause", "external"], ["'external'", "the run has none; it has velocity, drive"]),
         (["--cause", "gravity", "--no-loads"], ["--no-loads"]),
     ],
 )
