@@ -43,12 +43,13 @@ SweepInput<double> input(const Shared& shared, int k) {
 
 /// The method is made at its first call, so that memory is that of the methods that are used.
 Contestant single(const std::shared_ptr<Shared>& shared, const std::string& name,
-                  const DynamicsOptions& options) {
+                  const DynamicsOptions& options, bool with_loads = true) {
   auto method = std::make_shared<std::unique_ptr<DynamicsMethod>>();
-  return {name, 1, 1, true, shared->model.nv(), [shared, method, options](int k) {
+  return {name, 1, 1, with_loads, shared->model.nv(), [shared, method, options, with_loads](int k) {
             if (!*method) *method = make_dynamics(shared->model, options);
-            const DynamicsReport report = (*method)->evaluate(
-                0, input(*shared, k), shared->acceleration.data(), shared->loads.data());
+            double* loads = with_loads ? shared->loads.data() : nullptr;
+            const DynamicsReport report =
+                (*method)->evaluate(0, input(*shared, k), shared->acceleration.data(), loads);
             if (!report.ok()) throw std::runtime_error(std::string(message(report.outcome)));
             return shared->acceleration.data();
           }};
@@ -104,6 +105,7 @@ Field make_linkwise(const std::filesystem::path& folder) {
   DynamicsOptions plain;
   plain.threads = 1;
   enter("auto", plain);
+  field.contestants.push_back(single(shared, "auto, no loads", plain, false));
   for (const DynamicsEntry& method : dynamics_table()) {
     if (!method.linear_time && n > largest_for_mass_matrix) continue;
     DynamicsOptions options;

@@ -121,7 +121,8 @@ const DynamicsEntry& find_dynamics(std::string_view name) {
   throw InputError("method '" + std::string(name) + "' is unknown; known: " + known);
 }
 
-/// Shorter chains leave the pieces too short to pay for the cut system: benchmarks/README.md.
+/// Shorter chains leave the pieces too short to pay for the cut system:
+/// benchmarks/cpp/crossovers.cpp.
 constexpr int piecewise_from = 64;
 
 Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
