@@ -66,9 +66,10 @@ class RunPlots:
         for k, (axis, (half, unit, _)) in enumerate(zip(axes, _HALVES, strict=True)):
             parts, total = along_total(shares.values[..., 3 * k : 3 * k + 3])
             up, down = np.maximum(parts, 0), np.minimum(parts, 0)
-            areas = axis.stackplot(times, up.T, labels=causes, linewidth=0)
-            colours = [area.get_facecolor()[0] for area in areas]
-            axis.stackplot(times, down.T, colors=colours, linewidth=0)
+            if causes:
+                areas = axis.stackplot(times, up.T, labels=causes, linewidth=0)
+                colours = [area.get_facecolor()[0] for area in areas]
+                axis.stackplot(times, down.T, colors=colours, linewidth=0)
             axis.plot(times, total, color="black", linewidth=1.2, label="total")
             axis.set_ylabel(f"{half} [{unit}]")
         axes[0].legend(loc="upper right", ncols=4, frameon=False)

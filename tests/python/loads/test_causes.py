@@ -69,9 +69,11 @@ def mixed_machines(rng):
         yield (model.prescribe(given) if held else model), held
 
 
-@pytest.mark.parametrize("method", ["articulated_body", "constraint_force"])
+@pytest.mark.parametrize(
+    ("method", "tolerance"), [("articulated_body", 1e-13), ("constraint_force", 1e-11)]
+)
 @pytest.mark.parametrize("count", [1, 2, 9])
-def test_one_factorisation_gives_what_each_cause_alone_gives(method, count, rng):
+def test_one_factorisation_gives_what_each_cause_alone_gives(method, tolerance, count, rng):
     for model, is_held in mixed_machines(rng):
         q, v, tau, external, given = acting_on(model, rng, count)
         held = {"prescribed": given} if is_held else {}
@@ -80,10 +82,10 @@ def test_one_factorisation_gives_what_each_cause_alone_gives(method, count, rng)
         shares = _core.joint_loads_by_cause(model, causes, q, v, tau, method=method, **acting)
         expected = each_alone(model, causes, q, v, tau, external, given)
         scale = np.abs(expected).max()
-        np.testing.assert_allclose(shares, expected, atol=1e-10 * scale, rtol=0)
+        np.testing.assert_allclose(shares, expected, atol=tolerance * scale, rtol=0)
         whole = lw.forward_dynamics(model, q, v, tau, passive=True, full=True, **acting)
         total = shares.sum(axis=-3)
-        np.testing.assert_allclose(total, whole.joint_load, atol=1e-10 * scale, rtol=0)
+        np.testing.assert_allclose(total, whole.joint_load, atol=tolerance * scale, rtol=0)
 
 
 @pytest.mark.parametrize("threads", [2, 3, 7])
@@ -151,6 +153,7 @@ def test_causes_that_cannot_happen_are_left_out(gravity, drives, by_force, by_mo
         assert found == names.split()
         total = shares.sum("cause").transpose(*run.joint_load.dims)
         np.testing.assert_allclose(total, run.joint_load, atol=1e-10)
+    assert len(run.plot.split("elbow").axes) == 2
     locked = drives.get("wrist") == lw.Locked()
     assert ("passive" in lw.loads.split(run).cause.values) == (not locked)
 
