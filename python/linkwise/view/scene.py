@@ -45,6 +45,9 @@ _ROD_TONE, _MARK_TONE, _BOX_TONE = (120, 132, 146), (52, 58, 66), (230, 150, 60)
 _PLAIN = (0.62, 0.66, 0.70, 1.0)
 _MANY = 1500  # joints, above which marks at every joint only hide the links
 _SPARSE_LOADS, _SPARSE_POINTS = 60, 300  # of a machine with more: what a processor draws in time
+_THIN = 300  # joints, above which rods are thinner than a point of the screen
+_LOOKED_AT = 9  # moments of a run that the first picture makes room for
+_LIGHTEST = 1e-6  # of the whole: lighter links are placeholders, with any inertia
 _INSTANCES_A_SECOND = 500_000  # that viser's client takes in
 _ARROW_SHARE = 0.22  # of the machine's size: the largest load's arrow
 
@@ -76,7 +79,12 @@ class Scene:
         if source.recording is not None:
             start = source.recording.position(0)
         self._moment = self.at(start, None)
-        self.center, self.size = _extent(self._moment, model)
+        moments = [self._moment]
+        if source.recording is not None:
+            last = source.recording.times.size - 1
+            some = np.unique(np.linspace(0, last, _LOOKED_AT).astype(int))
+            moments = [self.at(source.recording.position(k), None) for k in some]
+        self.center, self.size = _extent(moments, model)
         self.style = LoadStyle((0.0, 0.0), _ARROW_SHARE * self.size)
         self.toggles: dict[str, bool] = {}
         self._add_looks(source)
@@ -199,6 +207,7 @@ class Scene:
         offsets[:, :3, 3] = model.link_centers_of_mass
         solid = np.flatnonzero(boxes.edges.max(axis=1, initial=0.0) > 0)
         near = solid[_stays_near(self._moment, model, boxes.edges, offsets)[solid]]
+        near = near[model.link_masses[near] > _LIGHTEST * model.link_masses.sum()]
         for toggle, chosen, shown, style in (
             (links, near, bare and few, {"batched_colors": _TONES[near % 2]}),
             ("Inertia boxes", solid, False, {"batched_colors": _BOX_TONE, "opacity": 0.35}),
@@ -222,8 +231,8 @@ class Scene:
             )
             rods = Spanning(inboard[outboard], outboard, 0.55 * thick)
             self.layers[links].append(Layer(handle, rods))
-        if not few:  # lines keep their width on the screen, however far away they are
-            ends = _sparse_tree(inboard, _SPARSE_POINTS)
+        if model.n_joints > _THIN:  # lines keep their width on the screen, however far away
+            ends = _sparse_tree(inboard, model.n_joints if few else _SPARSE_POINTS)
             lines = self._scene.add_line_segments(
                 "/bodies/lines",
                 points=np.zeros((len(ends[0]), 2, 3)),
@@ -289,7 +298,7 @@ class Scene:
         camera = server.initial_camera
         right, away = _across(self._moment)
         middle = self.center + 0.2 * self.size * right  # the panel covers the right of the window
-        camera.position = middle + 1.4 * self.size * away
+        camera.position = middle + 1.5 * self.size * away
         camera.look_at = middle
         camera.fov = np.deg2rad(50)
         camera.near, camera.far = 1e-3 * self.size, 100 * self.size
@@ -347,12 +356,15 @@ def _across(moment: Moment) -> tuple[Array, Array]:
     return right, away / np.linalg.norm(away)
 
 
-def _extent(moment: Moment, model: _core.Model) -> tuple[Array, float]:
-    """Centre and size of the machine: of its joint points, centres of mass and boxes."""
+def _extent(moments: list[Moment], model: _core.Model) -> tuple[Array, float]:
+    """Centre and size of where the machine is: of its joint points, centres of mass and boxes."""
     boxes = equivalent_boxes(model.link_masses, model.link_inertias).edges
-    centers = np.einsum("nij,nj->ni", moment.links[:, :3, :3], model.link_centers_of_mass)
-    centers = (centers + moment.links[:, :3, 3])[model.link_masses > 0]
-    points = np.concatenate([moment.joints[:, :3, 3], moment.links[:, :3, 3], centers])
+    found = []
+    for moment in moments:
+        centers = np.einsum("nij,nj->ni", moment.links[:, :3, :3], model.link_centers_of_mass)
+        centers = (centers + moment.links[:, :3, 3])[model.link_masses > 0]
+        found += [moment.joints[:, :3, 3], moment.links[:, :3, 3], centers]
+    points = np.concatenate(found)
     low, high = points.min(axis=0), points.max(axis=0)
     size = float(np.linalg.norm(high - low))
     largest = float(np.median(boxes.max(axis=1))) if len(boxes) else 0.0

@@ -87,3 +87,36 @@ def test_ten_thousand_links_take_one_message_a_group():
     assert min(spent) < 0.05  # seconds of a processor: twenty pictures a second and more
     marks = scene.joint_marks.batched_positions
     assert marks == pytest.approx(lw.body_poses(model, q)[:, :3, 3], rel=1e-6, abs=1e-3)
+
+
+def test_the_first_picture_has_room_for_the_whole_run(tmp_path):
+    chain = lw.scenes.chain(20, axes="parallel")
+    lw.simulate(chain, duration=2, every=0.1, q0=[1.5] + [0] * 19, output=tmp_path / "fall.zarr")
+    source = open_source(tmp_path / "fall.zarr", Options())
+    with running("127.0.0.1", 0, "fall") as server:
+        scene = Scene(server, source)
+    for sample in range(source.recording.times.size):
+        points = lw.body_poses(chain, source.recording.position(sample))[:, :3, 3]
+        assert (np.abs(points - scene.center) < 0.6 * scene.size).all()
+
+
+def test_placeholder_links_have_no_box(tmp_path):
+    def link(name, mass, inertia):
+        about = (
+            f"<inertia ixx='{inertia}' iyy='{inertia}' izz='{inertia}' ixy='0' ixz='0' iyz='0'/>"
+        )
+        return f"<link name='{name}'><inertial><mass value='{mass}'/>{about}</inertial></link>"
+
+    joint = (
+        "<joint name='j' type='revolute'><parent link='base'/><child link='arm'/>"
+        "<axis xyz='0 0 1'/>"
+        "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
+    )
+    links = link("base", 1e-6, 1e-6) + link("arm", 5, 0.1)
+    (tmp_path / "r.urdf").write_text(f"<robot name='r'>{links}{joint}</robot>")
+    source = open_source(tmp_path / "r.urdf", Options())
+    with running("127.0.0.1", 0, "r") as server:
+        scene = Scene(server, source)
+    boxes = [layer.place for layer in scene.layers["Bodies"] if hasattr(layer.place, "links")]
+    drawn = [source.model.link_names[k] for place in boxes for k in place.links]
+    assert drawn == ["arm"]
