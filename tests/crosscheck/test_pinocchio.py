@@ -96,7 +96,7 @@ def test_the_package_ships_the_robots():
 @pytest.mark.parametrize("name", sorted(REFUSED))
 def test_refused_robots_say_why(name):
     with pytest.raises(lw.InputError, match=REFUSED[name]) as error:
-        lw.load(ROBOTS[name])
+        lw.load(ROBOTS[name], mimic="independent")
     assert "\n" not in str(error.value)
     assert ROBOTS[name].name in str(error.value)
 
@@ -105,7 +105,7 @@ def test_refused_robots_say_why(name):
 def test_joint_order_of_pinocchio(name):
     """Asked for it, our joints and so q, v and tau come in Pinocchio's order."""
     reference = pin.buildModelFromUrdf(str(ROBOTS[name]))
-    model = lw.load(ROBOTS[name], joint_order="pinocchio")
+    model = lw.load(ROBOTS[name], joint_order="pinocchio", mimic="independent")
     assert list(model.joint_names) == list(reference.names)[1:]
 
 

@@ -23,7 +23,7 @@ class Pair:
         root = (pin.JointModelFreeFlyer(),) if floating_base else ()
         self.pin = pin.buildModelFromUrdf(str(path), *root)
         self.data = self.pin.createData()
-        self.model = lw.load(path, floating_base=floating_base)
+        self.model = lw.load(path, floating_base=floating_base, mimic="independent")
         names = list(self.model.joint_names)
         self.ids = [self.pin.getJointId(name) for name in names]
         assert max(self.ids, default=0) < self.pin.njoints, "a joint is unknown to Pinocchio"

@@ -190,7 +190,9 @@ def load_robot(robot: Robot) -> Machine:
         ) from None
     root = (pin.JointModelFreeFlyer(),) if robot.floating else ()
     theirs = pin.buildModelFromUrdf(str(path), *root)
-    model = lw.load(path, floating_base=robot.floating, joint_order="pinocchio")
+    model = lw.load(
+        path, floating_base=robot.floating, joint_order="pinocchio", mimic="independent"
+    )
     ours = list(model.joint_names)[1 if robot.floating else 0 :]
     if list(theirs.names)[2 if robot.floating else 1 :] != ours:
         raise RobotMissingError("its joints are in another order in Pinocchio")

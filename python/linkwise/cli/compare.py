@@ -77,7 +77,9 @@ def _motion(
     from linkwise.scenario import load_scenario
 
     if path.suffix.lower() != ".toml":
-        model = load(path, floating_base=floating_base, package_dirs=package_dirs)
+        model = load(
+            path, floating_base=floating_base, package_dirs=package_dirs, mimic="independent"
+        )
         return model, free_motion(model, states, seed)
     if floating_base or package_dirs:
         raise typer.BadParameter("a scenario says itself how its model is loaded; edit it")

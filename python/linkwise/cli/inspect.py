@@ -52,7 +52,7 @@ def _load(path: Path, floating_base: bool, package_dirs: Sequence[Path]) -> Mode
         if floating_base or package_dirs:
             raise typer.BadParameter("a scenario says itself how its model is loaded; edit it")
         return load_scenario(path).load_model()
-    return load(path, floating_base=floating_base, package_dirs=package_dirs)
+    return load(path, floating_base=floating_base, package_dirs=package_dirs, mimic="independent")
 
 
 def describe_model(model: Model) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def loads(
     opened = open_run(run)
     for name in joint or ():
         joint_position(opened, name)
-    machine = load(model) if model is not None else opened.load_model()
+    machine = load(model, mimic="independent") if model is not None else opened.load_model()
     found = collect(opened, machine, rating_tables(opened, ratings), certify, as_json)
     shares = peak_shares(opened, machine, found["summary"], split) if split else []
     records = peak_records(found, joint)

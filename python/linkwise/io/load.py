@@ -33,7 +33,7 @@ def load(
     package_dirs: Sequence[str | os.PathLike[str]] = (),
     joint_order: JointOrder = "file",
     keep_fixed: bool = False,
-    mimic: Mimic = "independent",
+    mimic: Mimic = "error",
 ) -> Model:
     """Read a URDF or MJCF file into a Model.
 
@@ -47,7 +47,8 @@ def load(
     joint_order: "file" keeps the file's order (parents first), "pinocchio" goes depth first with
         the joints of one link by name, so that q, v and tau can be handed over as they are.
     keep_fixed: keep links on fixed joints as bodies of their own instead of merging them.
-    mimic: what a URDF's mimic joints become: "independent" joints with a warning note, or "error".
+    mimic: a URDF's mimic joints are refused ("error"), for couplings are not supported, or they
+        move "independent" of each other, with a warning note.
 
     Raises InputError, in one line that names file, line, element and remedy, for anything that
     cannot be read without guessing. What was ignored or assumed is in ``model.notes``.

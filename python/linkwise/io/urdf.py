@@ -32,7 +32,7 @@ def read_urdf(
     floating_base: bool = False,
     joint_order: JointOrder = "file",
     keep_fixed: bool = False,
-    mimic: Mimic = "independent",
+    mimic: Mimic = "error",
 ) -> Model:
     """The model that the parsed URDF ``root`` describes; ``path`` is for messages.
 
@@ -66,7 +66,7 @@ def _refuse_mimic(checked: CheckedUrdf) -> None:
         checked.path,
         f"joint '{shorten(joint)}'",
         f"mimics joint '{shorten(target)}', and couplings are not supported",
-        'load with mimic="independent" or remove <mimic>',
+        'let it move on its own with mimic="independent", or remove <mimic>',
         line,
     )
 

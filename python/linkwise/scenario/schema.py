@@ -287,7 +287,7 @@ class ScenarioFile(Section):
     floating_base: bool = False
     joint_order: Literal["file", "pinocchio"] = "file"
     keep_fixed: bool = False
-    mimic: Literal["independent", "error"] = "independent"
+    mimic: Literal["error", "independent"] = "error"
     package_dirs: list[str] = []
     initial: InitialSection = InitialSection()
     drive: dict[str, DriveSection] = {}

@@ -171,7 +171,12 @@ def _load_model(path: Path, options: Options) -> tuple[Model, Path | None, Seque
     from linkwise.io.load import load
 
     if path.suffix.lower() != ".toml":
-        model = load(path, floating_base=options.floating_base, package_dirs=options.package_dirs)
+        model = load(
+            path,
+            floating_base=options.floating_base,
+            package_dirs=options.package_dirs,
+            mimic="independent",
+        )
         return model, path, options.package_dirs
     scenario = load_scenario(path)
     model = scenario.load_model()
