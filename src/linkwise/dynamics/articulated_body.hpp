@@ -355,20 +355,16 @@ class ArticulatedBody {
     a = w.a;
   }
 
-  /// The loops over a joint's degrees of freedom are unrolled for each number of them.
-  template <bool with_loads, int dofs = 6>
+  template <bool with_loads>
   void eliminate_general(const SweepInput<S>& in, int n, const BodyTopology& body,
                          ArticulatedInertia<S>& Y) {
     const GeneralState<S>& g = general_[body.general];
-    if constexpr (dofs > 0)
-      if (g.n < dofs) return eliminate_general<with_loads, dofs - 1>(in, n, body, Y);
     GeneralWork& w = general_body_[body.general];
     Force<S> p = body_[n].p;
     const auto& armature = model_->dof_values(DofProperty::armature);
-#pragma GCC unroll 6
-    for (int i = 0; i < dofs; ++i) w.U[i] = Y * g.P[i];
+    for (int i = 0; i < g.n; ++i) w.U[i] = Y * g.P[i];
     // Cholesky of D = P^T U + armature, rows of L with the reciprocal diagonal.
-    for (int i = 0; i < dofs; ++i) {
+    for (int i = 0; i < g.n; ++i) {
       for (int j = 0; j <= i; ++j) {
         S d = dot(g.P[i], w.U[j]);
         if (i == j) d = d + armature[g.dof[i]];
@@ -388,7 +384,7 @@ class ArticulatedBody {
     // W = U L^-T, so that U D^-1 U^T = W W^T and U D^-1 u = W (L^-1 u).
     Force<S> W[6];
     S z[6];
-    for (int i = 0; i < dofs; ++i) {
+    for (int i = 0; i < g.n; ++i) {
       Force<S> column = w.U[i];
       S y = w.u[i];
       for (int l = 0; l < i; ++l) {
@@ -401,7 +397,7 @@ class ArticulatedBody {
       subtract_outer(Y, W[i], W[i]);
     }
     p += Y * w.c;
-    for (int i = 0; i < dofs; ++i) p += Force<S>{z[i] * W[i].lin, z[i] * W[i].ang};
+    for (int i = 0; i < g.n; ++i) p += Force<S>{z[i] * W[i].lin, z[i] * W[i].ang};
     if constexpr (with_loads) eliminated_[n] = {Y, p};
     if (body.parent >= 0)
       give_to_parent(n, body, transform_to_parent(pose_[n], Y), transpose_times(pose_[n], p));

@@ -172,8 +172,9 @@ TEST(Paths, FillLanesOfRobotsWithLegsButNotOfChains) {
 }
 
 TEST(Paths, TheMethodOfATreeIsTheOneOnPaths) {
-  Draws draws(12);
-  const Model model = model_of(revolute_tree("tree", random_parents(80, draws)));
+  Tree arms = revolute_tree("arms", {});
+  add_legs(arms, 8, 10, -1);
+  const Model model = model_of(arms);
   ASSERT_TRUE(paths_fill(model, native_lanes));
   EXPECT_TRUE(is_cut(model));
   const DynamicsCase c(model, 5);
