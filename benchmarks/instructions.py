@@ -29,6 +29,7 @@ from linkwise.bench.machine import random_chain, random_states
 from linkwise.bench.process import MOST_MEMORY
 from linkwise.bench.race import write_case
 
+ROOT = Path(__file__).resolve().parents[1]
 STATES = 64
 BODIES = 30_000  # in the shorter count: startup must not matter
 ENGINES = ("linkwise", "pinocchio")
@@ -100,7 +101,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "results")
     parser.add_argument("--sizes", type=int, nargs="+", default=[7, 30, 300])
     arguments = parser.parse_args()
-    compiled = compile_worker(sources=None, build=None, only_if_ready=True, say=print)
+    compiled = compile_worker(sources=ROOT, build=None, only_if_ready=True, say=print)
     if compiled.program is None:
         raise SystemExit(f"no C++ worker: {compiled.reason}")
     if not shutil.which("valgrind"):
