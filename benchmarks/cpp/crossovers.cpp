@@ -32,7 +32,7 @@ double draw() { return std::normal_distribution<double>()(random_bits); }
 Model machine(const std::vector<int>& parents, bool floating_base) {
   ModelSpec spec;
   spec.gravity = {0, 0, -9.81};
-  spec.links.push_back({.name = "ground"});
+  spec.links.emplace_back().name = "ground";
   const auto add = [&](const std::string& name, const std::string& parent) {
     LinkSpec link;
     link.name = name;
