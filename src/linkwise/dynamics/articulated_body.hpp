@@ -34,7 +34,8 @@ class ArticulatedBody {
       general_body_[body.general].free = std::count(rotors, rotors + 6, 0.0) == 6;
     }
     bool hinges_only = true;
-    for (const Run& run : model.runs) hinges_only &= run.kind == BodyKind::hinge || run.end == 1;
+    for (const KindRange& range : model.kind_ranges)
+      hinges_only &= range.kind == BodyKind::hinge || range.end == 1;
     pose_.resize(hinges_only ? 1 : model.n_bodies());
   }
 
@@ -45,10 +46,10 @@ class ArticulatedBody {
     if (branches_ && branches_->any()) {
       evaluate_branches(in, du, loads);
     } else {
-      calc_velocities(in, model_->runs);
+      calc_velocities(in, model_->kind_ranges);
       add_external(in);
-      tip_to_base(in, model_->runs, loads);
-      base_to_tip(in, model_->runs, du, loads);
+      tip_to_base(in, model_->kind_ranges, loads);
+      base_to_tip(in, model_->kind_ranges, du, loads);
     }
     if (loads) store_loads(in, loads);
     return failed_body_ < 0;
@@ -66,8 +67,8 @@ class ArticulatedBody {
     threads_ = threads;
     if (!branches_->any()) return;
     given_of_.assign(model_->n_bodies(), -1);
-    for (const Run& run : branches_->trunk)
-      for (int n = run.begin; n < run.end; ++n) only_add(n);
+    for (const KindRange& range : branches_->trunk)
+      for (int n = range.begin; n < range.end; ++n) only_add(n);
     for (const auto& share : branches_->shares)
       for (const int root : share.roots)
         if (model_->topology[root].parent >= 0) {
@@ -99,10 +100,10 @@ class ArticulatedBody {
   }
   /// `again`: at the position of the last call.
   template <bool again = false>
-  void calc_velocities(const SweepInput<S>& in, const std::vector<Run>& runs) {
+  void calc_velocities(const SweepInput<S>& in, const std::vector<KindRange>& ranges) {
     const Model& model = *model_;
     const Motion<S> resting{};
-    for_runs_base_to_tip(runs, [&](auto joint, int begin, int end) {
+    for_kind_ranges_base_to_tip(ranges, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];
@@ -142,17 +143,18 @@ class ArticulatedBody {
       if (model_->joints[j].last_of_body)
         body_[model_->joints[j].body].p -= user_wrench(in.external, model_->joints[j], j);
   }
-  void tip_to_base(const SweepInput<S>& in, const std::vector<Run>& runs, const S* loads) {
+  void tip_to_base(const SweepInput<S>& in, const std::vector<KindRange>& ranges, const S* loads) {
     if (loads)
-      tip_to_base<true>(in, runs);
+      tip_to_base<true>(in, ranges);
     else
-      tip_to_base<false>(in, runs);
+      tip_to_base<false>(in, ranges);
   }
-  void base_to_tip(const SweepInput<S>& in, const std::vector<Run>& runs, S* du, const S* loads) {
+  void base_to_tip(const SweepInput<S>& in, const std::vector<KindRange>& ranges, S* du,
+                   const S* loads) {
     if (loads)
-      base_to_tip<true>(in, runs, du);
+      base_to_tip<true>(in, ranges, du);
     else
-      base_to_tip<false>(in, runs, du);
+      base_to_tip<false>(in, ranges, du);
   }
   Force<S>& joint_load(int n) { return eliminated_[n].p; }
   void store_loads(const SweepInput<S>& in, S* loads) const {
@@ -194,15 +196,15 @@ class ArticulatedBody {
   /// Trunk and branches [hwang1988]; what the branches give to the trunk is added in their order.
   void evaluate_branches(const SweepInput<S>& in, S* du, S* loads) {
     const auto each = [&](auto&& sweep) {
-      const auto task = [&](int i) { sweep(branches_->shares[i].runs); };
+      const auto task = [&](int i) { sweep(branches_->shares[i].kind_ranges); };
       parallel_for(static_cast<int>(branches_->shares.size()), threads_, std::ref(task));
     };
     calc_velocities(in, branches_->trunk);
-    each([&](const std::vector<Run>& runs) { calc_velocities(in, runs); });
+    each([&](const std::vector<KindRange>& ranges) { calc_velocities(in, ranges); });
     add_external(in);
-    each([&](const std::vector<Run>& runs) { tip_to_base(in, runs, loads); });
-    for (const Run& run : branches_->trunk)
-      for (int n = run.begin; n < run.end; ++n) body_[n].Y = {};
+    each([&](const std::vector<KindRange>& ranges) { tip_to_base(in, ranges, loads); });
+    for (const KindRange& range : branches_->trunk)
+      for (int n = range.begin; n < range.end; ++n) body_[n].Y = {};
     for (const auto& share : branches_->shares)
       for (const int root : share.roots)
         if (given_of_[root] >= 0) {
@@ -212,7 +214,7 @@ class ArticulatedBody {
         }
     tip_to_base(in, branches_->trunk, loads);
     base_to_tip(in, branches_->trunk, du, loads);
-    each([&](const std::vector<Run>& runs) { base_to_tip(in, runs, du, loads); });
+    each([&](const std::vector<KindRange>& ranges) { base_to_tip(in, ranges, du, loads); });
   }
 
   LW_INLINE void give_to_parent(int n, const BodyTopology& body, const ArticulatedInertia<S>& Y,
@@ -242,9 +244,9 @@ class ArticulatedBody {
   }
 
   template <bool with_loads>
-  void tip_to_base(const SweepInput<S>& in, const std::vector<Run>& runs) {
+  void tip_to_base(const SweepInput<S>& in, const std::vector<KindRange>& ranges) {
     const Model& model = *model_;
-    for_runs_tip_to_base(runs, [&](auto joint, int begin, int end) {
+    for_kind_ranges_tip_to_base(ranges, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = end - 1; n >= begin; --n) {
         const BodyTopology& body = model.topology[n];
@@ -404,10 +406,10 @@ class ArticulatedBody {
   }
 
   template <bool with_loads>
-  void base_to_tip(const SweepInput<S>& in, const std::vector<Run>& runs, S* du) {
+  void base_to_tip(const SweepInput<S>& in, const std::vector<KindRange>& ranges, S* du) {
     const Model& model = *model_;
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
-    for_runs_base_to_tip(runs, [&](auto joint, int begin, int end) {
+    for_kind_ranges_base_to_tip(ranges, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];

@@ -29,8 +29,8 @@ class ArticulatedPaths {
     for (int begin = -idle; begin < n_paths; begin += lanes) add_group(begin, seat);
     for (int i = 0; i < n_paths; ++i) connect(i, seat);
     // The trunk gets what the paths give before, and outer bodies are not all that a carrier gets.
-    for (const Run& run : paths_.trunk)
-      for (int n = run.begin; n < run.end; ++n) plain_.only_add(n);
+    for (const KindRange& range : paths_.trunk)
+      for (int n = range.begin; n < range.end; ++n) plain_.only_add(n);
     std::vector<char> carries(model.n_bodies(), 0);
     for (int n = 0; n < model.n_bodies(); ++n) {
       if (seat[n].group >= 0) continue;
@@ -67,8 +67,8 @@ class ArticulatedPaths {
     plain_.calc_velocities(in, paths_.outer);
     add_outside(in, loads);
     tip_to_base(loads);
-    for (const Run& run : paths_.trunk)
-      for (int n = run.begin; n < run.end; ++n) plain_.body(n).Y = {};
+    for (const KindRange& range : paths_.trunk)
+      for (int n = range.begin; n < range.end; ++n) plain_.body(n).Y = {};
     for (const auto& [parent, from] : to_trunk_) {
       const Gift<S>& gifts = groups_[from.group].gift_at(from.position);
       const auto gift = get_lanes<Gift<double>, S>(gifts, from.lane);

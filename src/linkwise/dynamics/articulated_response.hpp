@@ -11,12 +11,12 @@ namespace linkwise {
 template <class S>
 void ArticulatedBody<S>::evaluate_again(const SweepInput<S>& in, S* du, S* loads) {
   if (in.v)
-    calc_velocities<true>(in, model_->runs);
+    calc_velocities<true>(in, model_->kind_ranges);
   else
     rest(in);
   add_external(in);
   tip_to_base_again(in);
-  base_to_tip<true>(in, model_->runs, du);
+  base_to_tip<true>(in, model_->kind_ranges, du);
   store_loads(in, loads);
 }
 
@@ -38,7 +38,7 @@ void ArticulatedBody<S>::rest(const SweepInput<S>& in) {
 template <class S>
 void ArticulatedBody<S>::tip_to_base_again(const SweepInput<S>& in) {
   const Model& model = *model_;
-  for_runs_tip_to_base(model, [&](auto joint, int begin, int end) {
+  for_kind_ranges_tip_to_base(model, [&](auto joint, int begin, int end) {
     using J = decltype(joint);
     for (int n = end - 1; n >= begin; --n) {
       const BodyTopology& body = model.topology[n];

@@ -36,7 +36,7 @@ class ConstraintElimination {
     require_regular_inertias(model);
     for (int n = 0; n < model.n_bodies(); ++n)
       compliance_.push_back(invert_inertia(model.constants[n].inertia));
-    for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+    for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       if constexpr (!is_general<J>)
         for (int n = begin; n < end; ++n) {
@@ -122,7 +122,7 @@ class ConstraintElimination {
   void calc_velocities(const SweepInput<S>& in) {
     const Model& model = *model_;
     const Motion<S> resting{};
-    for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+    for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];
@@ -174,7 +174,7 @@ class ConstraintElimination {
   void tip_to_base(const SweepInput<S>& in) {
     const Model& model = *model_;
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
-    for_runs_tip_to_base(model, [&](auto joint, int begin, int end) {
+    for_kind_ranges_tip_to_base(model, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = end - 1; n >= begin; --n) {
         const BodyTopology& body = model.topology[n];
@@ -257,7 +257,7 @@ class ConstraintElimination {
   void base_to_tip(const SweepInput<S>& in, S* du) {
     const Model& model = *model_;
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
-    for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+    for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];
@@ -362,7 +362,7 @@ class ConstraintElimination {
   /// In the bases that calc_joint_constraint() chooses.
   template <class Out>
   void for_forces(Out&& out) const {
-    for_runs_base_to_tip(*model_, [&](auto joint, int begin, int end) {
+    for_kind_ranges_base_to_tip(*model_, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyWork& w = body_[n];

@@ -42,7 +42,7 @@ class InverseDynamics {
   void base_to_tip(const SweepInput<S>& in, const S* du) {
     const Model& model = *model_;
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
-    for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+    for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];
@@ -68,7 +68,7 @@ class InverseDynamics {
 
   void project(const SweepInput<S>& in, const S* du, S* tau) {
     const Model& model = *model_;
-    for_runs_base_to_tip(model, [&](auto joint, int begin, int end) {
+    for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = begin; n < end; ++n) {
         const BodyTopology& body = model.topology[n];

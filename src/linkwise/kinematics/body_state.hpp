@@ -39,41 +39,41 @@ struct SweepInput {
   double gravity_factor = 1;
 };
 
-/// Calls f(joint, begin, end) for every run of bodies with equal joints; joint is one of the
-/// structs of axis_joints.hpp or GeneralJoint. One dispatch a run, none a body.
+/// Calls f(joint, begin, end) for every range of bodies with equal joints; joint is one of the
+/// structs of axis_joints.hpp or GeneralJoint. One dispatch per range, none per body.
 struct GeneralJoint {};
 template <class F>
-LW_INLINE void dispatch_run(const Run& run, F&& f) {
-  switch (run.kind) {
+LW_INLINE void dispatch_kind_range(const KindRange& range, F&& f) {
+  switch (range.kind) {
     case BodyKind::hinge:
-      return f(HingeJoint{}, run.begin, run.end);
+      return f(HingeJoint{}, range.begin, range.end);
     case BodyKind::revolute:
-      return f(RevoluteJoint{}, run.begin, run.end);
+      return f(RevoluteJoint{}, range.begin, range.end);
     case BodyKind::geared:
-      return f(GearedJoint{}, run.begin, run.end);
+      return f(GearedJoint{}, range.begin, range.end);
     case BodyKind::prismatic:
-      return f(PrismaticJoint{}, run.begin, run.end);
+      return f(PrismaticJoint{}, range.begin, range.end);
     case BodyKind::helical:
-      return f(HelicalJoint{}, run.begin, run.end);
+      return f(HelicalJoint{}, range.begin, range.end);
     case BodyKind::general:
-      return f(GeneralJoint{}, run.begin, run.end);
+      return f(GeneralJoint{}, range.begin, range.end);
   }
 }
 template <class F>
-LW_INLINE void for_runs_base_to_tip(const std::vector<Run>& runs, F&& f) {
-  for (const Run& run : runs) dispatch_run(run, f);
+LW_INLINE void for_kind_ranges_base_to_tip(const std::vector<KindRange>& ranges, F&& f) {
+  for (const KindRange& range : ranges) dispatch_kind_range(range, f);
 }
 template <class F>
-LW_INLINE void for_runs_base_to_tip(const Model& model, F&& f) {
-  for_runs_base_to_tip(model.runs, f);
+LW_INLINE void for_kind_ranges_base_to_tip(const Model& model, F&& f) {
+  for_kind_ranges_base_to_tip(model.kind_ranges, f);
 }
 template <class F>
-LW_INLINE void for_runs_tip_to_base(const std::vector<Run>& runs, F&& f) {
-  for (size_t i = runs.size(); i-- > 0;) dispatch_run(runs[i], f);
+LW_INLINE void for_kind_ranges_tip_to_base(const std::vector<KindRange>& ranges, F&& f) {
+  for (size_t i = ranges.size(); i-- > 0;) dispatch_kind_range(ranges[i], f);
 }
 template <class F>
-LW_INLINE void for_runs_tip_to_base(const Model& model, F&& f) {
-  for_runs_tip_to_base(model.runs, f);
+LW_INLINE void for_kind_ranges_tip_to_base(const Model& model, F&& f) {
+  for_kind_ranges_tip_to_base(model.kind_ranges, f);
 }
 template <class J>
 inline constexpr bool is_general = std::is_same_v<J, GeneralJoint>;
@@ -123,12 +123,13 @@ LW_INLINE Force<S> user_wrench(const S* external, const JointInfo& joint, int in
   return transpose_times(joint.to_user, Force<S>{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
 }
 
-/// The states of a run of bodies, external wrenches left out; those of the parents must be there.
+/// The states of a range of bodies, external wrenches left out; those of the parents must be there.
 template <class S>
-LW_INLINE void calc_run_states(const Model& model, const Run& run, const SweepInput<S>& in,
-                               BodyState<S>* states, GeneralState<S>* general) {
+LW_INLINE void calc_range_states(const Model& model, const KindRange& range,
+                                 const SweepInput<S>& in, BodyState<S>* states,
+                                 GeneralState<S>* general) {
   const Motion<S> resting{};
-  dispatch_run(run, [&](auto joint, int begin, int end) {
+  dispatch_kind_range(range, [&](auto joint, int begin, int end) {
     using J = decltype(joint);
     for (int n = begin; n < end; ++n) {
       const BodyTopology& body = model.topology[n];
@@ -156,7 +157,8 @@ LW_INLINE void calc_run_states(const Model& model, const Run& run, const SweepIn
 template <class S>
 void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states,
                       GeneralState<S>* general) {
-  for (const Run& run : model.runs) calc_run_states(model, run, in, states, general);
+  for (const KindRange& range : model.kind_ranges)
+    calc_range_states(model, range, in, states, general);
   if (!in.external) return;
   for (int j = 0; j < model.n_joints(); ++j)
     if (model.joints[j].last_of_body)

@@ -11,10 +11,10 @@ namespace linkwise {
 
 struct Branches {
   struct Share {
-    std::vector<Run> runs;
+    std::vector<KindRange> kind_ranges;
     std::vector<int> roots;  ///< of its subtrees, ascending; their parents are in the trunk
   };
-  std::vector<Run> trunk;
+  std::vector<KindRange> trunk;
   std::vector<Share> shares;
 
   /// Empty, no shares, where cutting would not halve what has to be done one after the other.

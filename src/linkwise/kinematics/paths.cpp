@@ -17,7 +17,8 @@ Paths::Paths(const Model& model) {
               : turns                    ? Zone::paths
               : inboard == Zone::inboard ? Zone::inboard
                                          : Zone::outboard;
-    if (zone[n] != Zone::paths) append_body(zone[n] == Zone::inboard ? trunk : outer, at.kind, n);
+    if (zone[n] != Zone::paths)
+      append_to_ranges(zone[n] == Zone::inboard ? trunk : outer, at.kind, n);
   }
   // Of outboard bodies equally high the first one continues the path.
   std::vector<int> height(n_bodies, 0), outboard(n_bodies, -1);

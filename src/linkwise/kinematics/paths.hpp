@@ -19,9 +19,9 @@ struct Paths {
   /// Shortest first.
   std::vector<Path> path;
   /// Joints of other kinds between the ground and the first revolute ones, as of a floating base.
-  std::vector<Run> trunk;
+  std::vector<KindRange> trunk;
   /// What a joint of another kind carries farther out, and all beyond it.
-  std::vector<Run> outer;
+  std::vector<KindRange> outer;
 
   explicit Paths(const Model& model);
 

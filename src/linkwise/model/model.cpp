@@ -490,7 +490,7 @@ class ModelAssembly {
   }
 
   void make_runs() {
-    for (int b = 0; b < m.n_bodies(); ++b) append_body(m.runs, m.topology[b].kind, b);
+    for (int b = 0; b < m.n_bodies(); ++b) append_to_ranges(m.kind_ranges, m.topology[b].kind, b);
     std::vector<char> met(m.n_bodies(), 0);
     for (int b = m.n_bodies() - 1; b >= 0; --b) {
       const int p = m.topology[b].parent;

@@ -44,17 +44,17 @@ struct BodyConstants {
 };
 
 /// Bodies [begin, end) of one kind.
-struct Run {
+struct KindRange {
   BodyKind kind;
   int begin, end;
 };
 
-/// Body n, the next one of its kind or the first of a new run.
-inline void append_body(std::vector<Run>& runs, BodyKind kind, int n) {
-  if (!runs.empty() && runs.back().end == n && runs.back().kind == kind)
-    ++runs.back().end;
+/// Body n, the next one of its kind or the first of a new range.
+inline void append_to_ranges(std::vector<KindRange>& ranges, BodyKind kind, int n) {
+  if (!ranges.empty() && ranges.back().end == n && ranges.back().kind == kind)
+    ++ranges.back().end;
   else
-    runs.push_back({kind, n, n + 1});
+    ranges.push_back({kind, n, n + 1});
 }
 
 struct JointInfo {
@@ -101,7 +101,7 @@ class Model {
   std::vector<BodyTopology> topology;
   std::vector<BodyConstants<double>> constants;
   std::vector<Element> elements;
-  std::vector<Run> runs;
+  std::vector<KindRange> kind_ranges;
   std::vector<JointInfo> joints;
   std::vector<LinkInfo> links;
   std::vector<Note> notes;

@@ -139,8 +139,8 @@ TEST_P(PathThreads, EveryBodyIsOnOnePathOrNone) {
   const Model model = model_of(GetParam());
   const Paths paths(model);
   std::vector<int> met(model.n_bodies(), 0);
-  for (const auto* runs : {&paths.trunk, &paths.outer})
-    for (const linkwise::Run& r : *runs)
+  for (const auto* ranges : {&paths.trunk, &paths.outer})
+    for (const linkwise::KindRange& r : *ranges)
       for (int n = r.begin; n < r.end; ++n) ++met[n];
   for (size_t i = 0; i < paths.path.size(); ++i) {
     const auto& path = paths.path[i];

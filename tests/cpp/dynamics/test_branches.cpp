@@ -78,16 +78,16 @@ TEST_P(BranchThreads, EveryBodyIsInOneShareOrTheTrunk) {
   const Branches branches(model);
   std::vector<int> where(model.n_bodies(), -1);  // share, or one beyond them: the trunk
   const int trunk = static_cast<int>(branches.shares.size());
-  const auto enter = [&](const std::vector<linkwise::Run>& runs, int place) {
-    for (const linkwise::Run& run : runs)
-      for (int n = run.begin; n < run.end; ++n) {
+  const auto enter = [&](const std::vector<linkwise::KindRange>& ranges, int place) {
+    for (const linkwise::KindRange& range : ranges)
+      for (int n = range.begin; n < range.end; ++n) {
         EXPECT_EQ(where[n], -1);
-        EXPECT_EQ(model.topology[n].kind, run.kind);
+        EXPECT_EQ(model.topology[n].kind, range.kind);
         where[n] = place;
       }
   };
   enter(branches.trunk, trunk);
-  for (int i = 0; i < trunk; ++i) enter(branches.shares[i].runs, i);
+  for (int i = 0; i < trunk; ++i) enter(branches.shares[i].kind_ranges, i);
   for (int n = 0; n < model.n_bodies(); ++n) {
     ASSERT_GE(where[n], 0);
     if (where[n] == trunk) continue;
