@@ -1,4 +1,4 @@
-"""Shared set-up: the helpers package on the path, one deterministic hypothesis profile."""
+"""Shared set-up: the helpers and the tools of the repository on the path, one deterministic hypothesis profile."""
 
 import os
 import signal
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tools")]
 
 # A shell that starts pytest in the background has it ignore Ctrl-C, which the tests of it need.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -7,10 +7,11 @@ exits with status 1 when there is any. Addresses on the network are not looked a
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+
+from source_text import tracked_files
 
 FENCE = re.compile(r"^(```|~~~).*?^\1\s*$", re.MULTILINE | re.DOTALL)
 CODE = re.compile(r"`[^`\n]*`")
@@ -19,12 +20,6 @@ LINK = re.compile(r"!?\[[^\]]*\]\(\s*([^)\s]+)[^)]*\)")
 TAG = re.compile(r"<(?:img|a)\b[^>]*?\b(?:src|href)=\"([^\"]+)\"")
 HEADING = re.compile(r"^#{1,6}\s+(.+?)\s*#*\s*$", re.MULTILINE)
 ELSEWHERE = re.compile(r"[a-z][a-z0-9+.-]*:", re.IGNORECASE)
-
-
-def tracked_documents(root: Path) -> list[str]:
-    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md"]
-    output = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True).stdout
-    return sorted(name for name in output.split("\0") if name and (root / name).is_file())
 
 
 def blank(pattern: re.Pattern[str], text: str) -> str:
@@ -76,6 +71,7 @@ def check(root: Path, paths: list[str]) -> list[str]:
     return [
         f"{path}:{line}: {target}: {problem}"
         for path in paths
+        if path.endswith(".md")
         for line, target in links((root / path).read_text(encoding="utf-8"))
         if (problem := check_link(root, path, target))
     ]
@@ -83,7 +79,7 @@ def check(root: Path, paths: list[str]) -> list[str]:
 
 def main() -> int:
     root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent
-    violations = check(root, tracked_documents(root))
+    violations = check(root, tracked_files(root))
     print(*violations, sep="\n", end="\n" if violations else "")
     print(f"check_documents: {len(violations)} violations")
     return 1 if violations else 0

@@ -1,15 +1,18 @@
-"""Checks that the C++ sources include only what their layer may see (ARCHITECTURE.md, layers).
+"""Checks that the C++ sources include only what their layer may see (ARCHITECTURE.md, layers), that
+neither includes nor Python imports go in circles, and that ARCHITECTURE.md shows the true arrows.
 
 Run from anywhere: python tools/check_layers.py [repository]. Prints one line per violation and
-exits with status 1 when there is any.
+exits with status 1 when there is any. With --arrows it writes the arrows into ARCHITECTURE.md.
 """
 
 from __future__ import annotations
 
+import argparse
 import re
 import sys
-from collections.abc import Iterator
 from pathlib import Path
+
+from import_graph import SUFFIXES, arrows, circles, import_graph, include_graph, includes, rooms
 
 #: What each layer may include besides itself. Two columns, numerics and mechanics, meet in
 #: dynamics: solve never sees a mechanism, constraint fills the systems of linear without solving.
@@ -49,14 +52,8 @@ SYSTEM = re.compile(
     r"([a-z_]+intrin|unistd|sched|pthread|sys/(mman|resource|stat|types))\.h|[a-z0-9_]+"
 )
 
-INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
-SUFFIXES = {".hpp", ".cpp", ".cu", ".h"}
-
-
-def includes(path: Path) -> Iterator[tuple[int, str, str]]:
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
-        if match := INCLUDE.match(line):
-            yield number, match[1], match[2]
+#: The arrows in ARCHITECTURE.md, a code block between two marks.
+ARROWS = re.compile(r"(<!-- arrows -->\n).*?(<!-- /arrows -->)", re.DOTALL)
 
 
 def layer_of(path: str) -> str | None:
@@ -101,9 +98,59 @@ def check(root: Path) -> list[str]:
     return violations
 
 
+#: Files that still use each other, by the ends of their names.
+EXCEPT = ("articulated_body.hpp", "articulated_response.hpp", "plots", "result", "source")
+EXCEPT += ("causes", "energy", "samples", "shown_loads")
+
+
+def check_circles(root: Path) -> list[str]:
+    graphs = {"includes": include_graph(root), "imports": import_graph(root)}
+    return [
+        f"{group[0]}: {what} go in a circle: {', '.join(group)}"
+        for what, graph in graphs.items()
+        for group in circles(graph)
+        if not all(name.endswith(EXCEPT) for name in group)
+    ]
+
+
+def picture(root: Path) -> str:
+    """Who sees whom, lowest first, without what is seen through another one."""
+    core = {file: to for file, to in include_graph(root).items() if file.startswith("src/")}
+    lines = [
+        "C++ (src/linkwise)",
+        *arrows(rooms(core, 2)),
+        "",
+        "Python (python/linkwise)",
+        *arrows(rooms(import_graph(root), 1)),
+    ]
+    return "\n".join(["```text", *lines, "```", ""])
+
+
+def check_picture(root: Path) -> list[str]:
+    document = root / "ARCHITECTURE.md"
+    if not document.is_file():
+        return []
+    shown = ARROWS.search(document.read_text(encoding="utf-8"))
+    if shown is None:
+        return []
+    if shown[0] == f"{shown[1]}{picture(root)}{shown[2]}":
+        return []
+    return ["ARCHITECTURE.md: its arrows are not the code's; run tools/check_layers.py --arrows"]
+
+
 def main() -> int:
-    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent
-    violations = check(root)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("repository", nargs="?", type=Path, default=Path(__file__).parent.parent)
+    parser.add_argument("--arrows", action="store_true", help="write them into ARCHITECTURE.md")
+    arguments = parser.parse_args()
+    root = arguments.repository
+    if arguments.arrows:
+        document = root / "ARCHITECTURE.md"
+        text = document.read_text(encoding="utf-8")
+        document.write_text(
+            ARROWS.sub(lambda m: f"{m[1]}{picture(root)}{m[2]}", text), encoding="utf-8"
+        )
+    violations = [*check(root), *check_circles(root), *check_picture(root)]
     print(*violations, sep="\n", end="\n" if violations else "")
     print(f"check_layers: {len(violations)} violations")
     return 1 if violations else 0

@@ -9,10 +9,11 @@ when there is any.
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+
+from source_text import tracked_files
 
 BIBLIOGRAPHY = "references.bib"
 KEY = re.compile(r"[a-z]+(?:1[6-9]|20)\d\d[a-z]?")
@@ -25,12 +26,6 @@ COMMENT_MARK = re.compile(r"\n\s*(?://+[!/]?|#+)")
 SUFFIXES = {".cpp", ".hpp", ".cu", ".py", ".md", ".toml", ".txt"}
 #: This tool and its test speak of keys that nobody cites.
 EXCEPT = {"tools/check_references.py", "tests/tools/test_check_documents.py"}
-
-
-def tracked_files(root: Path) -> list[str]:
-    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    output = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True).stdout
-    return sorted(name for name in output.split("\0") if name)
 
 
 def citations(text: str) -> Iterator[tuple[int, str]]:

@@ -1,6 +1,5 @@
 """What the documents say works: their Python, their commands, their links, their references."""
 
-import importlib.util
 import re
 import shlex
 import shutil
@@ -8,7 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import check_documents
+import check_references
+import make_gallery
 import pytest
+from source_text import tracked_files
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -33,13 +36,6 @@ def workplace(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def load_tool(tool):
-    spec = importlib.util.spec_from_file_location(tool, ROOT / "tools" / f"{tool}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.mark.parametrize("document", [d for d in DOCUMENTS if blocks(d, "python")], ids=name)
@@ -100,16 +96,14 @@ def test_a_wrong_number_ends_an_example(workplace):
 
 
 def test_the_gallery_says_what_the_examples_say():
-    gallery, maker = (ROOT / "docs" / "gallery.md").read_text(), load_tool("make_gallery")
-    for example in maker.SHOWN:
-        assert maker.page(ROOT, example) in gallery, example
-        assert (ROOT / "docs" / maker.picture(example)).is_file(), example
+    gallery = (ROOT / "docs" / "gallery.md").read_text()
+    for example in make_gallery.SHOWN:
+        assert make_gallery.page(ROOT, example) in gallery, example
+        assert (ROOT / "docs" / make_gallery.picture(example)).is_file(), example
 
 
-@pytest.mark.parametrize("tool", ["check_documents", "check_references"])
-def test_links_and_references_of_the_repository(tool):
+@pytest.mark.parametrize("checker", [check_documents, check_references], ids=lambda c: c.__name__)
+def test_links_and_references_of_the_repository(checker):
     if not (ROOT / ".git").exists():
         pytest.skip("not a clone: the tools ask git for the files")
-    checker = load_tool(tool)
-    list_files = getattr(checker, "tracked_documents", None) or checker.tracked_files
-    assert checker.check(ROOT, list_files(ROOT)) == []
+    assert checker.check(ROOT, tracked_files(ROOT)) == []

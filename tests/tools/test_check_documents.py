@@ -1,22 +1,8 @@
 """The checks of links and references find what they are for, and nothing else."""
 
-import importlib.util
-from pathlib import Path
-
+import check_documents as documents
+import check_references as references
 import pytest
-
-ROOT = Path(__file__).parents[2]
-
-
-def load_tool(name):
-    spec = importlib.util.spec_from_file_location(name, ROOT / "tools" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-documents = load_tool("check_documents")
-references = load_tool("check_references")
 
 PAGE = """# A page
 

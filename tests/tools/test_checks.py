@@ -1,23 +1,16 @@
 """The checks of tools/ find what they are for, and find nothing in this repository."""
 
-import importlib.util
 import subprocess
 from pathlib import Path
 
+import check_layers as layers
+import check_sources as sources
+import import_graph
 import pytest
+from function_lengths import functions
+from source_text import tracked_files
 
 ROOT = Path(__file__).parents[2]
-
-
-def load_tool(name):
-    spec = importlib.util.spec_from_file_location(name, ROOT / "tools" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-layers = load_tool("check_layers")
-sources = load_tool("check_sources")
 
 
 def write(root, path, text):
@@ -89,6 +82,8 @@ def test_the_layers_have_no_cycle():
         ("open.py", "x = 1", "no newline"),
         ("space.hpp", "int x; \n", "white space"),
         ("uv.lock", "x\n", "lock files"),
+        ("long_function.py", "def f():\n" + "    x = 1\n" * 80, ":1: f has 81 lines"),
+        ("long_function.cpp", "namespace n {\nint f() {\n" + "\n" * 80 + "}\n}\n", ":2: f has 82"),
     ],
 )
 def test_a_bad_source_is_found(tmp_path, name, text, problem):
@@ -103,10 +98,100 @@ def test_good_sources_are_not_reported(tmp_path):
     assert sources.check(tmp_path, ["long_table.csv", "good.py", "picture.png"]) == []
 
 
+CPP = """#define ODD(x) { x
+namespace linkwise {
+// int in_a_comment() {
+constexpr Row table[] = {
+    {"a{", make(1)},
+};
+template <class F>
+struct Thing : Base<f(3)> {
+    explicit Thing(int n = {}) : Base(n), a_{n}, b_{n, {1}} {
+        auto nested = [&](int x) { return x; };
+    }
+    bool operator()(double x) const noexcept
+    {
+        if (x > 1'000.0) { return '{' == '}'; }
+        return true;
+    }
+    int size = int{3};
+};
+auto Thing<int>::trail(int n) -> std::array<int, 2> { return {n, n}; }
+}  // namespace linkwise
+TEST(Suite, Name) {
+    const char* text = R"({ not a brace)";
+}
+"""
+
+
+def test_functions_of_a_cpp_file_are_found_with_their_lengths():
+    assert list(functions("a.cpp", CPP)) == [
+        (9, "Thing", 3),
+        (12, "operator()", 5),
+        (19, "trail", 1),
+        (21, "TEST", 3),
+    ]
+
+
+def test_a_docstring_does_not_lengthen_a_function():
+    text = 'def f():\n    """One\n\n    two.\n    """\n    return lambda: 1\n'
+    assert list(functions("a.py", text)) == [(1, "f", 2)]
+
+
+def test_a_circle_of_includes_is_found(tmp_path):
+    write(tmp_path, "src/linkwise/base/a.hpp", '#include "linkwise/base/b.hpp"\n')
+    write(tmp_path, "src/linkwise/base/b.hpp", '#include "linkwise/base/c.hpp"\n')
+    write(tmp_path, "src/linkwise/base/c.hpp", '#include "linkwise/base/a.hpp"\n')
+    write(tmp_path, "src/linkwise/base/d.hpp", '#include "linkwise/base/a.hpp"\n')
+    (violation,) = layers.check_circles(tmp_path)
+    assert "includes go in a circle" in violation
+    assert "c.hpp" in violation
+    assert "d.hpp" not in violation
+
+
+@pytest.mark.parametrize(
+    "late",
+    [
+        "from linkwise.one import a",
+        "def f():\n    from linkwise import one",
+        "if TYPE_CHECKING:\n    from . import one",
+        "import linkwise.one as o",
+    ],
+)
+def test_a_circle_of_imports_is_found(tmp_path, late):
+    write(tmp_path, "python/linkwise/__init__.py", "import linkwise.one, linkwise.two\n")
+    write(tmp_path, "python/linkwise/one.py", "import linkwise as lw\nfrom .two import b\n")
+    write(tmp_path, "python/linkwise/two.py", f"{late}\n")
+    (violation,) = layers.check_circles(tmp_path)
+    assert violation == "linkwise.one: imports go in a circle: linkwise.one, linkwise.two"
+
+
+def test_arrows_leave_out_what_is_seen_through_another():
+    graph = {"top": {"middle", "base"}, "middle": {"base"}, "base": set(), "alone": {"base"}}
+    assert import_graph.arrows(graph) == [
+        "base",
+        "alone  -> base",
+        "middle -> base",
+        "top    -> middle",
+    ]
+
+
+def test_a_stale_picture_of_the_layers_is_found(tmp_path):
+    write(tmp_path, "src/linkwise/base/a.hpp", "\n")
+    marked = "<!-- arrows -->\n{}<!-- /arrows -->\n"
+    write(tmp_path, "ARCHITECTURE.md", marked.format(layers.picture(tmp_path)))
+    assert layers.check_picture(tmp_path) == []
+    write(tmp_path, "ARCHITECTURE.md", marked.format("```text\nold\n```\n"))
+    (violation,) = layers.check_picture(tmp_path)
+    assert "arrows are not the code's" in violation
+
+
 def test_this_repository_passes():
     assert layers.check(ROOT) == []
+    assert layers.check_circles(ROOT) == []
+    assert layers.check_picture(ROOT) == []
     try:
-        paths = sources.tracked_files(ROOT)
+        paths = tracked_files(ROOT)
     except (OSError, subprocess.CalledProcessError):
         pytest.skip("not a git checkout")
     assert sources.check(ROOT, paths) == []
