@@ -1,4 +1,4 @@
-"""Shared set-up: the helpers and the tools of the repository on the path, one deterministic hypothesis profile."""
+"""Shared set-up: helpers and tools on the path, one deterministic hypothesis profile."""
 
 import os
 import signal

@@ -54,12 +54,16 @@ NAME = re.compile(r"[A-Za-z_]\w*")
 EXCEPT = {"CHANGELOG.md", "tools/check_words.py", "tests/tools/test_check_words.py"}
 
 
+def line_of(text: str, match: re.Match[str]) -> int:
+    return text.count("\n", 0, match.start()) + 1
+
+
 def file_names(text: str) -> Iterator[tuple[int, str]]:
     """Line number and name of every file and folder of the repository that a text names."""
     for pattern in (FILE, FOLDER):
         for match in pattern.finditer(text):
             if not PLACEHOLDER.search(match[1]):
-                yield text.count("\n", 0, match.start()) + 1, match[1]
+                yield line_of(text, match), match[1]
 
 
 def check_file_names(path: str, text: str, known: set[str]) -> list[str]:
@@ -85,7 +89,7 @@ def check_phrases(path: str, text: str) -> list[str]:
     """Anywhere in a file: comments, documents, and what programs say."""
     flat = LINE_START.sub(lambda match: " " * len(match[0]), text)  # phrases go over line ends
     return [
-        f"{path}:{text.count(chr(10), 0, match.start()) + 1}: {' '.join(match[0].split())}: {remedy}"
+        f"{path}:{line_of(text, match)}: {' '.join(match[0].split())}: {remedy}"
         for pattern, remedy in BANNED.items()
         for match in re.finditer(pattern, flat)
     ]
@@ -96,7 +100,7 @@ def identifiers(path: str, text: str) -> Iterator[tuple[int, str]]:
     if suffix in CPP:
         code = cpp_code(text)
         for match in NAME.finditer(code):
-            yield code.count("\n", 0, match.start()) + 1, match[0]
+            yield line_of(code, match), match[0]
     elif suffix == ".py":
         for token in tokenize.generate_tokens(io.StringIO(text).readline):
             if token.type == tokenize.NAME:

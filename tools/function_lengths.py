@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from source_text import blanked, cpp_code
 
-#: The end of a function's head: its arguments, qualifiers, and a return type or member initialisers.
+#: The end of a function's head: arguments, qualifiers, a return type or member initialisers.
 QUALIFIERS = r"(?:\s*(?:const|noexcept|override|final|mutable|requires\b[^;{}]*|&&?))*"
 HEAD = re.compile(rf"\){QUALIFIERS}\s*(?:->[^;{{}}]*|:\s[^;]*[)}}]\s*)?$")
 #: What opens a block whose functions are counted one by one.
