@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "linkwise/exec/sections.hpp"
+#include "linkwise/exec/tiles.hpp"
 
 namespace linkwise {
 
-TreeSystem::TreeSystem(const Model& model, int threads)
+TreeSystem::TreeSystem(const Model& model, const Executor& executor)
     : model_(&model),
-      threads_(threads),
+      executor_(executor),
       state_(model.n_bodies()),
       general_(model.n_general),
       joint_(model.n_bodies()),
@@ -191,7 +191,7 @@ void TreeSystem::assemble_at(const SweepInput<double>& in, std::span<const Motio
 
 void TreeSystem::assemble_rows(const SweepInput<double>& in) {
   calc_free_accelerations(in);
-  Sections(model_->n_bodies(), SectionOf::nodes).for_each(threads_, [&](int, int begin, int end) {
+  Tiles(model_->n_bodies(), TileOf::nodes).for_each(executor_, [&](int, int begin, int end) {
     for (int n = begin; n < end; ++n) assemble_node(n, in);
   });
   for (BlockTree::Hub& hub : A_.hubs) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "linkwise/constraint/joint_constraint.hpp"
+#include "linkwise/exec/executor.hpp"
 #include "linkwise/linear/block_tree.hpp"
 
 namespace linkwise {
@@ -16,8 +17,8 @@ namespace linkwise {
 class TreeSystem {
  public:
   /// InputError naming the body when one has a singular inertia.
-  /// `threads` share the rows; they influence no result.
-  explicit TreeSystem(const Model& model, int threads = 1);
+  /// The executor shares the rows; it influences no result.
+  explicit TreeSystem(const Model& model, const Executor& executor = Executor());
 
   const BlockTree& A() const { return A_; }
   const std::vector<double>& b() const { return b_; }
@@ -48,7 +49,7 @@ class TreeSystem {
   void assemble_node(int n, const SweepInput<double>& in);
 
   const Model* model_;
-  int threads_;
+  Executor executor_;
   BlockTree A_;
   std::vector<double> b_;
   std::vector<Compliance<double>> compliance_;

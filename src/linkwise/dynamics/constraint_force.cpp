@@ -7,17 +7,18 @@ namespace linkwise {
 
 namespace {
 
-SolverOptions with_threads(SolverOptions options, int threads) {
-  options.threads = checked_threads(threads);
-  return options;
+SolverOptions solver_options(const DynamicsOptions& options) {
+  SolverOptions own = options.solver_options;
+  own.executor = Executor(checked_threads(options.threads));
+  return own;
 }
 
 }  // namespace
 
 ConstraintForce::ConstraintForce(const Model& model, const DynamicsOptions& options)
     : model_(&model),
-      system_(model, checked_threads(options.threads)),
-      solver_(make_solver(options.solver, with_threads(options.solver_options, options.threads))),
+      system_(model, Executor(checked_threads(options.threads))),
+      solver_(make_solver(options.solver, solver_options(options))),
       guess_(make_initial_guess(options.initial_guess, {options.history})),
       f_(system_.A().size()),
       direct_(find_solver(options.solver).kind == SolverKind::direct) {}

@@ -94,7 +94,7 @@ DynamicsReport JointSpaceConjugateGradient::evaluate(double, const SweepInput<do
           for (size_t k = 0; k < r.size(); ++k) z[k] = inverse_diagonal_[k] * r[k];
           return z;
         },
-        options_.threads);
+        options_.executor);
     static_cast<Report&>(report) = {stop_.outcome(), stop_.iterations(), stop_.relative_error(),
                                     -1};
   }

@@ -28,8 +28,8 @@ void ScaledTree::add_coupling(std::span<const double> x, std::span<double> y,
 }
 
 void ScaledTree::hub_sums(std::span<const double> x, std::span<double> sums) const {
-  const Sections sections(static_cast<int>(hubs.size()), SectionOf::nodes);
-  sections.for_each(threads_, [&](int, int begin, int end) {
+  const Tiles tiles(static_cast<int>(hubs.size()), TileOf::nodes);
+  tiles.for_each(executor_, [&](int, int begin, int end) {
     for (int h = begin; h < end; ++h) {
       double* const sum = sums.data() + 6 * h;
       std::fill(sum, sum + 6, 0.0);

@@ -90,21 +90,21 @@ void ScaledTree::set_structure(const BlockTree& A) {
 bool ScaledTree::prepare(const BlockTree& A) {
   structure_changed_ = !same_structure(A);
   if (structure_changed_) set_structure(A);
-  const Sections nodes(n(), SectionOf::nodes);
-  std::array<int, max_sections> failed;
-  nodes.for_each(threads_, [&](int s, int begin, int end) {
-    failed[s] = -1;
+  const Tiles tiles(n(), TileOf::nodes);
+  std::array<int, max_tiles> failed;
+  tiles.for_each(executor_, [&](int t, int begin, int end) {
+    failed[t] = -1;
     for (int i = begin; i < end; ++i)
       with_dim(dim[i], [&](auto d) {
         double* const lower = lower_[i].data();
         pack_lower<d.n>(A.diag[i].data(), lower);
-        if (!ldlt_factor<d.n>(lower) && failed[s] < 0) failed[s] = i;
+        if (!ldlt_factor<d.n>(lower) && failed[t] < 0) failed[t] = i;
 #pragma GCC unroll 6
         for (int k = 0; k < d.n; ++k) roots_[i][k] = std::sqrt(lower[packed(k, k)]);
       });
   });
-  for (int s = 0; s < nodes.count; ++s) {
-    failed_node_ = failed[s];
+  for (int t = 0; t < tiles.count; ++t) {
+    failed_node_ = failed[t];
     if (failed_node_ >= 0) return false;
   }
   for_each_node([&](int i) {

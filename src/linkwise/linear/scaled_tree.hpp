@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "linkwise/exec/sections.hpp"
+#include "linkwise/exec/tiles.hpp"
 #include "linkwise/linear/block_tree.hpp"
 #include "linkwise/linear/ldlt.hpp"
 
@@ -23,8 +23,8 @@ class ScaledTree {
     std::vector<int> children;  ///< ascending
   };
 
-  /// Threads that share the work from now on; they influence no result.
-  void set_threads(int threads) { threads_ = threads; }
+  /// Who shares the work from now on; it influences no result.
+  void set_executor(const Executor& executor) { executor_ = executor; }
   /// Scales A. False when a diagonal block or a hub's compliance is not positive definite;
   /// failed_node() tells where.
   bool prepare(const BlockTree& A);
@@ -77,13 +77,13 @@ class ScaledTree {
   void scale_node(const BlockTree& A, int i);
   template <class F>
   void for_each_node(F&& f) const {
-    Sections(n(), SectionOf::nodes).for_each(threads_, [&](int, int begin, int end) {
+    Tiles(n(), TileOf::nodes).for_each(executor_, [&](int, int begin, int end) {
       for (int i = begin; i < end; ++i) f(i);
     });
   }
   template <class F>
   double sum_over_nodes(F&& f) const {
-    return Sections(n(), SectionOf::nodes).sum(threads_, [&](int begin, int end) {
+    return Tiles(n(), TileOf::nodes).sum(executor_, [&](int begin, int end) {
       double total = 0.0;
       for (int i = begin; i < end; ++i) total += f(i);
       return total;
@@ -93,7 +93,8 @@ class ScaledTree {
   std::vector<PackedLower> lower_;            ///< unit L; the diagonal holds 1 / D
   std::vector<std::array<double, 6>> roots_;  ///< sqrt(1 / D)
   mutable std::vector<double> hub_sums_;
-  int failed_node_ = -1, joints_on_a_body_ = 2, threads_ = 1;
+  int failed_node_ = -1, joints_on_a_body_ = 2;
+  Executor executor_;
   bool structure_changed_ = false;
 };
 

@@ -1,12 +1,12 @@
 #pragma once
-// Operations on long vectors, section by section on `threads` threads. Sums run in eight
-// interleaved partial sums a section, a fixed shape: fast, more accurate than one running sum, and
-// the same bits on every run, for every vector width and any number of threads.
+// Operations on long vectors, tile by tile. Sums run in eight interleaved partial sums per tile, a
+// fixed shape: fast, more accurate than one running sum, and the same bits on every run, for every
+// vector width and any number of threads.
 
 #include <cstddef>
 #include <span>
 
-#include "linkwise/exec/sections.hpp"
+#include "linkwise/exec/tiles.hpp"
 
 namespace linkwise {
 
@@ -20,36 +20,38 @@ inline double interleaved_sum(std::size_t begin, std::size_t end, Term&& term) {
   return ((part[0] + part[4]) + (part[2] + part[6])) + ((part[1] + part[5]) + (part[3] + part[7]));
 }
 
-inline double dot(std::span<const double> a, std::span<const double> b, int threads = 1) {
+inline double dot(std::span<const double> a, std::span<const double> b,
+                  const Executor& executor = Executor()) {
   const double *p = a.data(), *q = b.data();
-  const Sections sections(static_cast<int>(a.size()), SectionOf::entries);
-  return sections.sum(threads, [=](int begin, int end) {
+  const Tiles tiles(static_cast<int>(a.size()), TileOf::entries);
+  return tiles.sum(executor, [=](int begin, int end) {
     return interleaved_sum(begin, end, [=](std::size_t i) { return p[i] * q[i]; });
   });
 }
 
-inline double sum_of_squares(std::span<const double> a, int threads = 1) {
-  return dot(a, a, threads);
+inline double sum_of_squares(std::span<const double> a, const Executor& executor = Executor()) {
+  return dot(a, a, executor);
 }
 
 /// f(i) for every i below n.
 template <class F>
-inline void for_each_entry(std::size_t n, int threads, F&& f) {
-  const Sections sections(static_cast<int>(n), SectionOf::entries);
-  sections.for_each(threads, [&](int, int begin, int end) {
+inline void for_each_entry(std::size_t n, const Executor& executor, F&& f) {
+  const Tiles tiles(static_cast<int>(n), TileOf::entries);
+  tiles.for_each(executor, [&](int, int begin, int end) {
     for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i) f(i);
   });
 }
 
 /// y += factor x.
 inline void add_scaled(double factor, std::span<const double> x, std::span<double> y,
-                       int threads = 1) {
-  for_each_entry(y.size(), threads, [=](std::size_t i) { y[i] += factor * x[i]; });
+                       const Executor& executor = Executor()) {
+  for_each_entry(y.size(), executor, [=](std::size_t i) { y[i] += factor * x[i]; });
 }
 
 /// y = x - y.
-inline void subtract_from(std::span<const double> x, std::span<double> y, int threads = 1) {
-  for_each_entry(y.size(), threads, [=](std::size_t i) { y[i] = x[i] - y[i]; });
+inline void subtract_from(std::span<const double> x, std::span<double> y,
+                          const Executor& executor = Executor()) {
+  for_each_entry(y.size(), executor, [=](std::size_t i) { y[i] = x[i] - y[i]; });
 }
 
 }  // namespace linkwise

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "linkwise/exec/executor.hpp"
 #include "linkwise/linear/block_tree.hpp"
 
 namespace linkwise {
@@ -26,7 +27,7 @@ std::string_view message(Outcome outcome);
 /// What the user can do about it, one sentence; empty for `converged`.
 std::string_view remedy(Outcome outcome);
 
-/// When an iteration stops. See stop_rule.hpp.
+/// When an iteration stops. See stop_test.hpp.
 enum class StopRule {
   paper,        ///< ||x+ - x|| / ||x+|| <= tolerance [sharf1993, section 5]
   residual,     ///< ||b - A x|| / ||b|| <= tolerance
@@ -89,8 +90,8 @@ struct SolverOptions {
   bool estimate_error = false;
   /// lagged_thomas: how many iterations a solve may take before the factor is renewed.
   int lag_limit = 8;
-  /// Threads that an iteration's products and sums are shared by; they influence no result.
-  int threads = 1;
+  /// Who shares an iteration's products and sums; it influences no result.
+  Executor executor;
 };
 
 /// Throws InputError that names the option when one is out of range.

@@ -18,7 +18,7 @@ void StopTest::start(const SolverOptions& options, const ScaledTree* scaling, in
   squared_error_ = std::numeric_limits<double>::infinity();
   scaling_ = scaling;
   rule_ = options.stop;
-  threads_ = options.threads;
+  executor_ = options.executor;
   tolerance_ = options.tolerance;
   absolute_tolerance_ = options.absolute_tolerance;
   if (rule_ == StopRule::energy_norm && options.energy_bound) {
@@ -48,7 +48,7 @@ void StopTest::start_correction(double solution_energy, int max_iterations) {
 void StopTest::set_right_hand_side(std::span<const double> b) {
   if (needs_residual())
     right_hand_side_norm_ =
-        scaling_ ? scaling_->residual_norm(b) : std::sqrt(sum_of_squares(b, threads_));
+        scaling_ ? scaling_->residual_norm(b) : std::sqrt(sum_of_squares(b, executor_));
 }
 
 double StopTest::energy_bound() const {
@@ -100,14 +100,14 @@ bool StopTest::meets_energy_rule(const IterationStep& step) const {
 
 bool StopTest::meets_rule(const IterationStep& step) const {
   const auto solution_norm = [&](std::span<const double> v) {
-    return scaling_ ? scaling_->solution_norm(v) : std::sqrt(sum_of_squares(v, threads_));
+    return scaling_ ? scaling_->solution_norm(v) : std::sqrt(sum_of_squares(v, executor_));
   };
   switch (rule_) {
     case StopRule::paper:
       return step.factor * solution_norm(step.change) <= tolerance_ * solution_norm(step.x);
     case StopRule::residual: {
       const double norm = scaling_ ? scaling_->residual_norm(step.residual)
-                                   : std::sqrt(sum_of_squares(step.residual, threads_));
+                                   : std::sqrt(sum_of_squares(step.residual, executor_));
       return norm <= tolerance_ * right_hand_side_norm_;
     }
     case StopRule::energy_norm:
@@ -121,8 +121,8 @@ bool StopTest::at_rounding_level(const IterationStep& step) const {
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   if (correcting_ || std::abs(step.decrease) > 1e3 * epsilon * epsilon * step.solution_energy)
     return false;
-  const double change = step.factor * step.factor * sum_of_squares(step.change, threads_);
-  return change <= 4.0 * epsilon * epsilon * sum_of_squares(step.x, threads_);
+  const double change = step.factor * step.factor * sum_of_squares(step.change, executor_);
+  return change <= 4.0 * epsilon * epsilon * sum_of_squares(step.x, executor_);
 }
 
 bool StopTest::stops(const IterationStep& step) {

@@ -78,7 +78,7 @@ class StopTest {
 
   EnergyEstimate estimate_;
   const ScaledTree* scaling_ = nullptr;
-  int threads_ = 1;
+  Executor executor_;
   StopRule rule_ = StopRule::energy_norm;
   double squared_error_ = 0.0, first_decrease_ = 0.0;
   double tolerance_ = 0.0, absolute_tolerance_ = 0.0;

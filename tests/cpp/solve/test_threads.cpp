@@ -1,9 +1,9 @@
-// Threads share the sections of an iteration's products and sums and change no bit of the result.
+// Threads share the tiles of an iteration's products and sums and change no bit of the result.
 
 #include <gtest/gtest.h>
 
 #include "linear/block_tree_scenes.hpp"
-#include "linkwise/exec/sections.hpp"
+#include "linkwise/exec/tiles.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise::testing {
@@ -11,7 +11,7 @@ namespace {
 
 class SolverThreads : public ::testing::TestWithParam<SolverEntry> {};
 
-// Three sections of nodes, several of entries; a few iterations will do.
+// Three tiles of nodes, several of entries; a few iterations will do.
 TEST_P(SolverThreads, SameBits) {
   for (const Shape shape : {Shape::chain, Shape::random_tree}) {
     const BlockTree tree = random_tree(shape, Dims::five, 2500, 7);
@@ -21,7 +21,7 @@ TEST_P(SolverThreads, SameBits) {
       SolverOptions options;
       options.max_iterations = 12;
       options.spectral_radius = 0.9;  // else found by hundreds of products
-      options.threads = threads;
+      options.executor = Executor(threads);
       std::vector<double> x(b.size(), 0.0);
       make_solver(GetParam().name, options)->solve(tree, b, x);
       return x;
@@ -34,12 +34,12 @@ TEST_P(SolverThreads, SameBits) {
 INSTANTIATE_TEST_SUITE_P(Solvers, SolverThreads, ::testing::ValuesIn(solver_table()),
                          [](const auto& test) { return std::string(test.param.name); });
 
-TEST(SectionThreads, CoverEveryItemOnceWhateverTheLength) {
+TEST(TileThreads, CoverEveryItemOnceWhateverTheLength) {
   for (const int n : {0, 1, 1023, 1024, 1025, 5000, 1024 * 256 + 1, 1 << 20}) {
     std::vector<int> met(n, 0);
-    const Sections sections(n, SectionOf::nodes);
-    EXPECT_LE(sections.count, max_sections);
-    const double sum = sections.sum(3, [&](int begin, int end) {
+    const Tiles tiles(n, TileOf::nodes);
+    EXPECT_LE(tiles.count, max_tiles);
+    const double sum = tiles.sum(Executor(3), [&](int begin, int end) {
       for (int i = begin; i < end; ++i) ++met[i];
       return static_cast<double>(end - begin);
     });

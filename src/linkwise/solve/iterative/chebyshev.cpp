@@ -73,25 +73,25 @@ void Chebyshev::iterate(std::span<const double> b, std::span<double> x, StopTest
   std::fill(std::begin(last_changes_), std::end(last_changes_), 0.0);
   stop.set_smallest_eigenvalue(smallest_);
   multiply(x, residual_);
-  subtract_from(b, residual_, threads());
+  subtract_from(b, residual_, executor());
   double rho = 1.0;
   for (int k = 0;; ++k) {
     if (k == 1) rho = 1.0 / (1.0 - 0.5 * radius_ * radius_);
     if (k > 1) rho = 1.0 / (1.0 - 0.25 * radius_ * radius_ * rho);
-    for_each_entry(x.size(), threads(), [&](std::size_t i) {
+    for_each_entry(x.size(), executor(), [&](std::size_t i) {
       const double next = rho * (step_ * residual_[i] + x[i]) + (1.0 - rho) * previous_[i];
       change_[i] = next - x[i];
       previous_[i] = x[i];
       x[i] = next;
     });
     multiply(x, next_residual_);
-    subtract_from(b, next_residual_, threads());
-    const double with_old = dot(change_, residual_, threads());
-    const double with_new = dot(change_, next_residual_, threads());
+    subtract_from(b, next_residual_, executor());
+    const double with_old = dot(change_, residual_, executor());
+    const double with_new = dot(change_, next_residual_, executor());
     residual_.swap(next_residual_);
     IterationStep step;
     step.decrease = with_old + with_new;
-    step.solution_energy = dot(x, b, threads());
+    step.solution_energy = dot(x, b, executor());
     step.squared_error = calc_squared_error(std::max(0.0, with_old - with_new));
     step.x = x;
     step.change = change_;

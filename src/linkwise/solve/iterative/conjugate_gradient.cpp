@@ -30,7 +30,7 @@ class ConjugateGradient final : public IterativeSolver {
     else
       conjugate_gradients(
           b, x, stop, work_, product,
-          [](std::span<const double> r, std::span<double>) { return r; }, threads());
+          [](std::span<const double> r, std::span<double>) { return r; }, executor());
   }
 
   void three_term(std::span<const double> b, std::span<double> x, StopTest& stop);
@@ -45,15 +45,15 @@ void ConjugateGradient::three_term(std::span<const double> b, std::span<double> 
   change_.resize(x.size());
   std::span<double> z = work_.r, z_previous = work_.p, az = work_.q;
   multiply(x, z);
-  subtract_from(b, z, threads());
-  double known_energy = dot(x, b, threads()) + dot(x, z, threads());
+  subtract_from(b, z, executor());
+  double known_energy = dot(x, b, executor()) + dot(x, z, executor());
   if (known_energy < 0.0) {
     std::fill(x.begin(), x.end(), 0.0);
     std::copy(b.begin(), b.end(), z.begin());
     known_energy = 0.0;
   }
   stop.set_solution_energy(known_energy);
-  double zz = sum_of_squares(z, threads()), zz_previous = 0.0, gamma_previous = 0.0, rho = 1.0,
+  double zz = sum_of_squares(z, executor()), zz_previous = 0.0, gamma_previous = 0.0, rho = 1.0,
          share = 1.0;
   const double first_zz = zz;
   if (stop.accepts_start(zz)) return;
@@ -62,7 +62,7 @@ void ConjugateGradient::three_term(std::span<const double> b, std::span<double> 
   for (bool first = true;; first = false) {
     if (zz == 0.0) return stop.stop(Outcome::converged);
     multiply(z, az);
-    const double curvature = dot(z, az, threads());
+    const double curvature = dot(z, az, executor());
     if (!(curvature > 0.0)) return stop.stop(breakdown(zz, curvature, first_zz));
     const double gamma = zz / curvature;
     rho = first ? 1.0 : 1.0 / (1.0 - gamma / gamma_previous * (zz / zz_previous) / rho);
@@ -70,7 +70,7 @@ void ConjugateGradient::three_term(std::span<const double> b, std::span<double> 
     const double growth = first ? 0.0 : zz / zz_previous;
     step = rho * gamma;
     const double decrease = step * zz;
-    for_each_entry(x.size(), threads(), [&](std::size_t i) {
+    for_each_entry(x.size(), executor(), [&](std::size_t i) {
       const double next = rho * (gamma * z[i] + x[i]) + (1.0 - rho) * previous_[i];
       change_[i] = next - x[i];
       previous_[i] = x[i];
@@ -85,7 +85,7 @@ void ConjugateGradient::three_term(std::span<const double> b, std::span<double> 
     stop.set_smallest_eigenvalue(ritz.value());
     const double energy = known_energy + stop.estimate().total() + decrease;
     zz_previous = zz;
-    zz = sum_of_squares(z, threads());
+    zz = sum_of_squares(z, executor());
     share /= share + zz / zz_previous;
     const double bound = zz * share / stop.smallest_eigenvalue();
     if (stop.stops({.decrease = decrease,

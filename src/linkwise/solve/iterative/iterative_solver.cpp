@@ -28,7 +28,7 @@ void IterativeSolver::multiply(std::span<const double> x, std::span<double> y) c
 }
 
 double IterativeSolver::preconditioned_square(std::span<const double> residual) {
-  return sum_of_squares(residual, threads());
+  return sum_of_squares(residual, executor());
 }
 
 Outcome IterativeSolver::prepare_all(const BlockTree& A) {
@@ -44,7 +44,7 @@ Outcome IterativeSolver::prepare_all(const BlockTree& A) {
 }
 
 Report IterativeSolver::solve(const BlockTree& A, std::span<const double> b, std::span<double> x) {
-  const double size_of_b = sum_of_squares(b, threads());
+  const double size_of_b = sum_of_squares(b, executor());
   Report report;
   if (!std::isfinite(size_of_b)) {
     report.outcome = Outcome::not_finite;
@@ -55,7 +55,7 @@ Report IterativeSolver::solve(const BlockTree& A, std::span<const double> b, std
     std::fill(x.begin(), x.end(), 0.0);
     return report;
   }
-  if (!std::isfinite(sum_of_squares(x, threads()))) std::fill(x.begin(), x.end(), 0.0);
+  if (!std::isfinite(sum_of_squares(x, executor()))) std::fill(x.begin(), x.end(), 0.0);
   report.outcome = prepare_all(A);
   if (report.ok())
     report = run(A, b, x);
@@ -107,7 +107,7 @@ Report IterativeSolver::run(const BlockTree& A, std::span<const double> b, std::
     std::copy(x_.begin(), x_.end(), x.begin());
 
   Report report{stop_.outcome(), stop_.iterations(), stop_.relative_error(), -1};
-  if (!std::isfinite(sum_of_squares(x, threads()))) report.outcome = Outcome::not_finite;
+  if (!std::isfinite(sum_of_squares(x, executor()))) report.outcome = Outcome::not_finite;
   const bool ended = report.ok() || report.outcome == Outcome::stagnated;
   // A guess that is all but exact leaves nothing to see decrease: the residual tells.
   if (ended && options_.stop == StopRule::energy_norm && (!report.ok() || rounding_may_matter(x_)))
@@ -122,7 +122,7 @@ bool IterativeSolver::rounding_may_matter(std::span<const double> x) const {
   if (coordinates_ == Coordinates::original) return true;
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   const double floor =
-      10.0 * epsilon * epsilon * sum_of_squares(x, threads()) / stop_.smallest_eigenvalue();
+      10.0 * epsilon * epsilon * sum_of_squares(x, executor()) / stop_.smallest_eigenvalue();
   return floor > 0.01 * stop_.energy_bound() * stop_.energy_bound();
 }
 
@@ -134,7 +134,7 @@ double IterativeSolver::bound_error(std::span<const double> b, std::span<const d
     accurate_residual(*system_, b, x, residual_);
   } else {
     system_->multiply(x, residual_);
-    subtract_from(b, residual_, threads());
+    subtract_from(b, residual_, executor());
   }
   if (coordinates_ == Coordinates::block_scaled)
     scaled_.scale_right_hand_side(residual_, b_);
@@ -164,7 +164,7 @@ void IterativeSolver::verify(std::span<const double> b, std::span<double> x, Rep
     const bool complete = stop_.outcome() == Outcome::converged;
     // What an unfinished correction still lacks is part of the error too.
     const double missing = complete ? 0.0 : std::min(square, stop_.squared_error());
-    const double error = std::sqrt(std::max(0.0, dot(b_, x_, threads())) + missing);
+    const double error = std::sqrt(std::max(0.0, dot(b_, x_, executor())) + missing);
     report.error_estimate = error * scale;
     if (complete && error <= bound) return;
     if (!complete || error > 0.5 * previous) {
@@ -176,7 +176,7 @@ void IterativeSolver::verify(std::span<const double> b, std::span<double> x, Rep
       scaled_.unscale_solution(x_, correction_);
     else
       std::copy(x_.begin(), x_.end(), correction_.begin());
-    add_scaled(1.0, correction_, x, threads());
+    add_scaled(1.0, correction_, x, executor());
   }
 }
 

@@ -21,7 +21,7 @@ class IterativeSolver : public LinearSolver {
 
   IterativeSolver(const SolverOptions& options, Coordinates coordinates)
       : LinearSolver(options), coordinates_(coordinates) {
-    scaled_.set_threads(options.threads);
+    scaled_.set_executor(options.executor);
   }
 
   /// Once a solve, after scaling. An outcome other than `converged` ends the solve.
@@ -42,7 +42,7 @@ class IterativeSolver : public LinearSolver {
   /// y = A x in the coordinates of iterate().
   void multiply(std::span<const double> x, std::span<double> y) const;
   const ScaledTree& scaled() const { return scaled_; }
-  int threads() const { return options_.threads; }
+  const Executor& executor() const { return options_.executor; }
   const BlockTree& system() const { return *system_; }
   int failed_node() const { return failed_node_; }
   void set_failed_node(int node) { failed_node_ = node; }

@@ -20,16 +20,16 @@ class Jacobi final : public IterativeSolver {
     change_.resize(x.size());
     residual_.resize(x.size());
     multiply(x, residual_);
-    subtract_from(b, residual_, threads());
+    subtract_from(b, residual_, executor());
     while (true) {
       change_.swap(residual_);
-      add_scaled(1.0, change_, x, threads());
+      add_scaled(1.0, change_, x, executor());
       multiply(x, residual_);
-      subtract_from(b, residual_, threads());
+      subtract_from(b, residual_, executor());
       IterationStep step;
       // ||e||^2 - ||e - d||^2 = d^T (r + r+), and the change d is the old residual r.
-      step.decrease = sum_of_squares(change_, threads()) + dot(change_, residual_, threads());
-      step.solution_energy = dot(x, b, threads());
+      step.decrease = sum_of_squares(change_, executor()) + dot(change_, residual_, executor());
+      step.solution_energy = dot(x, b, executor());
       step.x = x;
       step.change = change_;
       step.residual = residual_;

@@ -70,15 +70,16 @@ struct KrylovVectors {
 template <class Multiply, class Precondition>
 void conjugate_gradients(std::span<const double> b, std::span<double> x, StopTest& stop,
                          KrylovVectors& work, Multiply&& multiply, Precondition&& precondition,
-                         int threads, double other_energy = 0.0, bool residual_is_known = false) {
+                         const Executor& executor, double other_energy = 0.0,
+                         bool residual_is_known = false) {
   work.resize(x.size());
   std::span<double> r = work.r, p = work.p, q = work.q;
   if (!residual_is_known) {
     multiply(std::span<const double>(x), r);
-    subtract_from(b, r, threads);
+    subtract_from(b, r, executor);
   }
   // ||x*||^2 - ||x* - x0||^2 = x0^T (b + r0)  [strakos2002]
-  double known_energy = dot(x, b, threads) + dot(x, r, threads);
+  double known_energy = dot(x, b, executor) + dot(x, r, executor);
   if (known_energy < 0.0) {
     // Zero is closer to the solution than the guess, whose rounding errors would remain.
     std::fill(x.begin(), x.end(), 0.0);
@@ -88,7 +89,7 @@ void conjugate_gradients(std::span<const double> b, std::span<double> x, StopTes
   known_energy += other_energy;
   stop.set_solution_energy(known_energy);
   std::span<const double> z = precondition(std::span<const double>(r), std::span<double>(work.z));
-  double rz = dot(r, z, threads), growth = 0.0;
+  double rz = dot(r, z, executor), growth = 0.0;
   const double first_rz = rz;
   if (stop.accepts_start(rz)) return;
   double share = 1.0;  // (z, r) / (p, M p)
@@ -99,13 +100,13 @@ void conjugate_gradients(std::span<const double> b, std::span<double> x, StopTes
     if (first)
       std::copy(z.begin(), z.end(), p.begin());
     else
-      for_each_entry(p.size(), threads, [&](std::size_t i) { p[i] = z[i] + growth * p[i]; });
+      for_each_entry(p.size(), executor, [&](std::size_t i) { p[i] = z[i] + growth * p[i]; });
     first = false;
     multiply(std::span<const double>(p), q);
-    const double curvature = dot(p, q, threads);
+    const double curvature = dot(p, q, executor);
     if (!(curvature > 0.0) || !(rz > 0.0)) return stop.stop(breakdown(rz, curvature, first_rz));
     const double step = rz / curvature;
-    for_each_entry(x.size(), threads, [&](std::size_t i) {
+    for_each_entry(x.size(), executor, [&](std::size_t i) {
       x[i] += step * p[i];
       r[i] -= step * q[i];
     });
@@ -114,7 +115,7 @@ void conjugate_gradients(std::span<const double> b, std::span<double> x, StopTes
     const double decrease = step * rz;
     const double energy = known_energy + stop.estimate().total() + decrease;
     z = precondition(std::span<const double>(r), std::span<double>(work.z));
-    const double next = dot(r, z, threads);
+    const double next = dot(r, z, executor);
     growth = next / rz;
     rz = next;
     share /= share + growth;

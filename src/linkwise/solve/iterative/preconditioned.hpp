@@ -18,7 +18,7 @@ class PreconditionedConjugateGradient : public IterativeSolver {
   double preconditioned_square(std::span<const double> residual) override {
     preconditioned_.resize(residual.size());
     precondition(residual, preconditioned_);
-    return dot(residual, preconditioned_, threads());
+    return dot(residual, preconditioned_, executor());
   }
 
   void iterate(std::span<const double> b, std::span<double> x, StopTest& stop) override {
@@ -35,7 +35,7 @@ class PreconditionedConjugateGradient : public IterativeSolver {
           precondition(r, z);
           return z;
         },
-        threads(), 0.0, residual_is_known);
+        executor(), 0.0, residual_is_known);
   }
 
   KrylovVectors work_;

@@ -75,7 +75,7 @@ double Relaxation::sweep(std::span<const double> b, std::span<double> x, double 
   double total = 0.0;
   for (int first = 0, end = 0; first < system.n(); first = end) {
     while (end < system.n() && colours_[sequence_[end]] == colours_[sequence_[first]]) ++end;
-    total += Sections(end - first, SectionOf::nodes).sum(threads(), [&](int from, int to) {
+    total += Tiles(end - first, TileOf::nodes).sum(executor(), [&](int from, int to) {
       return relax(first + from, first + to);
     });
   }
@@ -91,11 +91,11 @@ void Relaxation::iterate(std::span<const double> b, std::span<double> x, StopTes
     change = sweep(b, x, omega);
     if (stop.needs_residual()) {
       multiply(x, residual_);
-      subtract_from(b, residual_, threads());
+      subtract_from(b, residual_, executor());
     }
     IterationStep step;
     step.decrease = (2.0 - omega) / omega * change;
-    step.solution_energy = dot(x, b, threads());
+    step.solution_energy = dot(x, b, executor());
     step.x = x;
     step.change = change_;
     step.residual = residual_;

@@ -67,16 +67,16 @@ void ReducedConjugateGradient::iterate(std::span<const double> b, std::span<doub
   std::copy(b.begin(), b.end(), argument_.begin());
   clear(black, argument_);
   // ||x*||_A^2 = b_R^T b_R + (the energy of the reduced solution).
-  const double red_energy = sum_of_squares(argument_, threads());
+  const double red_energy = sum_of_squares(argument_, executor());
   std::fill(right_.begin(), right_.end(), 0.0);
   scaled().add_coupling(argument_, right_, colour_, black);
-  subtract_from(b, right_, threads());
+  subtract_from(b, right_, executor());
   clear(red, right_);
   clear(red, x);
   conjugate_gradients(
       right_, x, stop, work_,
       [this](std::span<const double> v, std::span<double> w) { multiply_reduced(v, w); },
-      [](std::span<const double> r, std::span<double>) { return r; }, threads(), red_energy);
+      [](std::span<const double> r, std::span<double>) { return r; }, executor(), red_energy);
   std::copy(x.begin(), x.end(), argument_.begin());
   scaled().add_coupling(argument_, x, colour_, red);
   negate(red, x);

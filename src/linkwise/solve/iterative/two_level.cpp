@@ -59,10 +59,10 @@ class TwoLevel final : public PreconditionedConjugateGradient {
     std::fill(correction_.begin(), correction_.end(), 0.0);
     coarse_.prolong_add(correction_);
     multiply(correction_, scratch_);
-    subtract_from(residual, scratch_, threads());
+    subtract_from(residual, scratch_, executor());
     std::copy(scratch_.begin(), scratch_.end(), correction_.begin());
     pieces_.solve_in_place(correction_);
-    return coarse_energy + dot(scratch_, correction_, threads());
+    return coarse_energy + dot(scratch_, correction_, executor());
   }
 
   void iterate(std::span<const double> b, std::span<double> x, StopTest& stop) override {
@@ -77,14 +77,14 @@ class TwoLevel final : public PreconditionedConjugateGradient {
     for (int pass = 0; pass < 6; ++pass) {
       if (pass < 2) {
         multiply(x, work_.r);
-        subtract_from(b, work_.r, threads());
+        subtract_from(b, work_.r, executor());
       } else {
         accurate_residual(system(), b, x, work_.r);
       }
       coarse_.restrict_all(work_.r);
       const double energy = coarse_.solve();
       if (pass == 0) first = energy;
-      const double scale = std::max(first, dot(x, b, threads()));
+      const double scale = std::max(first, dot(x, b, executor()));
       if (pass > 0 && energy <= 1e-3 * options_.tolerance * options_.tolerance * scale) return;
       coarse_.prolong_add(x);
     }
