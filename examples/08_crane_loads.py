@@ -78,7 +78,7 @@ if len(sys.argv) > 1:
     tips = {"rope": (0, 0, -ROPE)}
     save(sys.argv[1], run, panels, times=(0, 3, 6, 9, 12), tips=tips, view="xy")
 if len(sys.argv) > 2:
-    from linkwise.loads.html import write_report
+    from linkwise.plot import write_report
 
     found = {"summary": peaks, "bounds": bounds, "margins": None}
     print("report:", write_report(run, sys.argv[2], found))

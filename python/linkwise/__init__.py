@@ -55,16 +55,16 @@ _PUBLIC = {
     "Table": "linkwise.drives",
     "Torque": "linkwise.drives",
     "Wrench": "linkwise.drives",
-    "Progress": "linkwise.time_loop",
-    "Run": "linkwise.result",
-    "SimulationError": "linkwise.simulation",
-    "SimulationInterrupted": "linkwise.simulation",
+    "Progress": "linkwise.simulation.time_loop",
+    "Run": "linkwise.results",
+    "SimulationError": "linkwise.simulation.simulate",
+    "SimulationInterrupted": "linkwise.simulation.simulate",
     "load_scenario": "linkwise.scenario",
-    "open_run": "linkwise.record.read",
-    "run_scenario": "linkwise.simulation",
-    "simulate": "linkwise.simulation",
-    "simulate_batch": "linkwise.batch_simulation",
-    "sweep": "linkwise.sweeping",
+    "open_run": "linkwise.results",
+    "run_scenario": "linkwise.simulation.simulate",
+    "simulate": "linkwise.simulation.simulate",
+    "simulate_batch": "linkwise.simulation.batch",
+    "sweep": "linkwise.simulation.sweep",
 }
 _SUBMODULES = ("drives", "loads", "scenes")
 
@@ -157,15 +157,19 @@ if TYPE_CHECKING:
         solvers,
         stop_rules,
     )
-    from linkwise.batch_simulation import simulate_batch
     from linkwise.drives import PD, Drive, Free, Locked, Motion, Spring, Table, Torque, Wrench
     from linkwise.io.load import load
-    from linkwise.record.read import open_run
-    from linkwise.result import Run
+    from linkwise.results import Run, open_run
     from linkwise.scenario import load_scenario
-    from linkwise.simulation import SimulationError, SimulationInterrupted, run_scenario, simulate
-    from linkwise.sweeping import sweep
-    from linkwise.time_loop import Progress
+    from linkwise.simulation.batch import simulate_batch
+    from linkwise.simulation.simulate import (
+        SimulationError,
+        SimulationInterrupted,
+        run_scenario,
+        simulate,
+    )
+    from linkwise.simulation.sweep import sweep
+    from linkwise.simulation.time_loop import Progress
 
 
 def __getattr__(name: str) -> Any:

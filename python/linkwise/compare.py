@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import InputError
-from linkwise.arguments import number
-from linkwise.charts import Dot, DotChart, dots_to_svg
 from linkwise.drives import as_drive, as_wrench
+from linkwise.plot.charts import Dot, DotChart, dots_to_svg
+from linkwise.simulation.arguments import number
 
 if TYPE_CHECKING:
     from linkwise._core import Model

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.cli.output import number
-from linkwise.loads.samples import blocks, rows
+from linkwise.results.samples import blocks, rows
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 _SHOWN = 4
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from linkwise._core import Model
     from linkwise.loads.rating import Rating
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 _MOST_JOINTS = 40
 _SHOWN = ("force", "axial", "radial", "moment", "tilting_moment", "torque", "drive_power")
@@ -60,8 +60,8 @@ def loads(
 ) -> None:
     """Peak loads of every joint of a RUN: with bounds, by cause, against ratings."""
     from linkwise.io.load import load
-    from linkwise.loads.samples import joint_position
-    from linkwise.record.read import open_run
+    from linkwise.results import open_run
+    from linkwise.results.samples import joint_position
 
     opened = open_run(run)
     for name in joint or ():
@@ -73,7 +73,7 @@ def loads(
     if csv is not None:
         write_csv(records, csv)
     if html is not None:
-        from linkwise.loads.html import write_report
+        from linkwise.plot import write_report
 
         write_report(opened, html, found, machine)
     if as_json:
@@ -103,9 +103,9 @@ def tighter_run(run: Run, path: Path, quiet: bool) -> Run:
     from linkwise._core import InputError
     from linkwise.cli.progress import live_progress
     from linkwise.loads.certainty import TIGHTER
-    from linkwise.record.read import open_run
+    from linkwise.results import open_run
     from linkwise.scenario import load_scenario
-    from linkwise.simulation import simulate
+    from linkwise.simulation.simulate import simulate
 
     if path.is_dir():
         return open_run(path)
@@ -197,8 +197,7 @@ def peak_shares(run: Run, model: Model, summary: xr.Dataset, by: str) -> list[di
     import numpy as np
 
     from linkwise._core import InputError
-    from linkwise.loads.causes import CAUSES, Split
-    from linkwise.plots import along_total
+    from linkwise.loads.causes import CAUSES, Split, along_total
 
     if by not in CAUSES:
         raise InputError(f"--split: {by!r} is unknown; use force or motion")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 DONE, FAILED, WRONG_INPUT = 0, 1, 2
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from linkwise.cli.output import console
 
 if TYPE_CHECKING:
-    from linkwise.time_loop import Progress
+    from linkwise.simulation.time_loop import Progress
 
 
 def _clock(seconds: float) -> str:

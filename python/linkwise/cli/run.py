@@ -19,7 +19,7 @@ from linkwise.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 
 def run(
@@ -41,7 +41,7 @@ def run(
     from linkwise.cli.progress import live_progress
     from linkwise.record.claim import unused_path
     from linkwise.scenario import load_scenario
-    from linkwise.simulation import SimulationError, SimulationInterrupted, run_scenario
+    from linkwise.simulation.simulate import SimulationError, SimulationInterrupted, run_scenario
 
     loaded = load_scenario(scenario)
     if output is None and loaded.settings.output.path is None:

@@ -38,7 +38,7 @@ def sweep(
     from linkwise._core import InputError
     from linkwise.record.export import write_netcdf
     from linkwise.scenario import parse_axis
-    from linkwise.sweeping import sweep as run_sweep
+    from linkwise.simulation.sweep import sweep as run_sweep
 
     axes = {}
     for key, values in map(parse_axis, axis):

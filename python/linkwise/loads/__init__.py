@@ -10,7 +10,7 @@ from linkwise.loads.energy import energy_balance
 from linkwise.loads.engineering import QUANTITIES, quantities
 from linkwise.loads.fatigue import cycles, damage_equivalent, load_duration, spectrum
 from linkwise.loads.frames import in_frame
-from linkwise.loads.peaks import envelope, summary
+from linkwise.loads.peaks import envelope, peak_loads, summary
 from linkwise.loads.rating import Rating, margins
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "in_frame",
     "load_duration",
     "margins",
+    "peak_loads",
     "quantities",
     "spectrum",
     "split",

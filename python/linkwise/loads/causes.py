@@ -9,7 +9,7 @@ import numpy as np
 
 from linkwise import _core
 from linkwise._core import InputError
-from linkwise.loads.samples import (
+from linkwise.results.samples import (
     Array,
     drive_kinds,
     external,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 By = Literal["force", "motion"]
 
@@ -160,3 +160,11 @@ def split(run: Run, by: By = "force", model: Model | None = None) -> xr.DataArra
         attrs={**given.attrs, "long_name": f"joint load by {by}", **about},
         name="joint_load",
     )
+
+
+def along_total(shares: Array) -> tuple[Array, Array]:
+    """Shares (time, cause, 3) along their sum (time, cause), and the size of the sum (time,)."""
+    total = shares.sum(axis=1)
+    size = np.linalg.norm(total, axis=-1)
+    direction = total / np.where(size > 0, size, 1.0)[:, None]
+    return np.einsum("tci,ti->tc", shares, direction), size

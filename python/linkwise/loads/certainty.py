@@ -20,7 +20,7 @@ from linkwise import _core
 from linkwise._core import InputError
 from linkwise.loads.engineering import derive, derived_rows, joint_directions
 from linkwise.loads.peaks import summary
-from linkwise.loads.samples import (
+from linkwise.results.samples import (
     Array,
     blocks,
     external,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 # How many times tighter `--certify` simulates again.
 TIGHTER = 100.0

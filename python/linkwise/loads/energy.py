@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise import _core
-from linkwise.loads.samples import Array, external, model_of, need_whole, rows
+from linkwise.results.samples import Array, external, model_of, need_whole, rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 
 def dissipated_power(model: Model, q: Array, v: Array) -> Array:

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from linkwise.loads.samples import Array, Selection, joint_names, model_of, need, rows, select
+from linkwise.results.samples import Array, Selection, joint_names, model_of, need, rows, select
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 
 class Quantity(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 
 from linkwise._core import InputError
 from linkwise.loads.engineering import QUANTITIES, derive, drive_power, has_power, joint_directions
-from linkwise.loads.samples import (
+from linkwise.results.samples import (
     Array,
     joint_names,
     joint_position,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 COMPONENTS = ("fx", "fy", "fz", "nx", "ny", "nz")
 # Slopes of Woehler lines: welded steel, steel, cast iron and composites.

@@ -9,13 +9,13 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import InputError
-from linkwise.loads.samples import Array, joint_names, model_of, need_whole, rows
+from linkwise.results.samples import Array, joint_names, model_of, need_whole, rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 Frame = Literal["child", "parent", "world"]
 _AXES = {

@@ -12,7 +12,7 @@ from linkwise.loads.engineering import (
     has_power,
     joint_directions,
 )
-from linkwise.loads.samples import (
+from linkwise.results.samples import (
     Array,
     blocks,
     joint_names,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 # A load counts as on duty above this share of its peak.
 DUTY_LEVEL = 0.1
@@ -181,3 +181,35 @@ def envelope(run: Run) -> xr.Dataset:
         data[f"{name}_time"] = (dims, values, {"long_name": f"time of the {name}", "units": "s"})
     coords = {"joint": ("joint", joint_names(run)), "component": given["component"]}
     return xr.Dataset(data, coords=coords)
+
+
+def peak_loads(run: Run) -> xr.Dataset:
+    """Largest force and moment that each joint carries, and when.
+
+    Returns:
+        Dataset over `joint`: `force` [N] and `moment` [N m] (magnitudes of the joint load's two
+        halves, the moment about the joint point) with `force_time` and `moment_time` [s].
+
+    Raises:
+        InputError: the run holds no joint loads or no samples.
+    """
+    import xarray as xr
+
+    names, times = joint_names(run), run.dataset["time"].values
+    largest = np.full((2, len(names)), -1.0)
+    when = np.zeros((2, len(names)))
+    for where in blocks(run, 48 * len(names)):
+        load = rows(run, "joint_load", where).reshape(-1, len(names), 2, 3)
+        size = np.linalg.norm(load, axis=-1)
+        at = np.argmax(size, axis=0)
+        peak = np.take_along_axis(size, at[None], axis=0)[0].T
+        better = peak > largest
+        largest[better] = peak[better]
+        when[better] = times[where.start + at.T][better]
+    data = {}
+    for k, (name, units) in enumerate((("force", "N"), ("moment", "N m"))):
+        attrs = {"long_name": f"largest joint {name}", "units": units}
+        data[name] = ("joint", largest[k], attrs)
+        at_attrs = {"long_name": f"time of the largest joint {name}", "units": "s"}
+        data[f"{name}_time"] = ("joint", when[k], at_attrs)
+    return xr.Dataset(data, coords={"joint": ("joint", run.dataset["joint"].values)})

@@ -11,7 +11,7 @@ import numpy as np
 from linkwise._core import InputError
 from linkwise.io.complaint import near
 from linkwise.loads.engineering import QUANTITIES
-from linkwise.loads.samples import Array
+from linkwise.results.samples import Array
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from linkwise.charts import Axis, Chart, Line, to_svg
 from linkwise.paper import notes
+from linkwise.plot.charts import Axis, Chart, Line, to_svg
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto;

@@ -202,7 +202,7 @@ def _content(source: Source, scene: Scene, motion: Motion) -> dict[str, Any]:
         if "links" in layer:
             layer["links"] = motion.link_poses[layer["links"]]
     names = source.model.joint_names
-    use = rating_use(source, needed=False)
+    use = rating_use(source.model, source.ratings, needed=False)
     rating = None
     if use is not None:
         rating = {"directions": np.nan_to_num(use.directions, nan=np.inf), "limits": use.limits}

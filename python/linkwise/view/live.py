@@ -56,7 +56,7 @@ class View:
         server.gui.add_html(headline(source))
         self.scene = Scene(server, source)
         recording = source.recording
-        self._use = rating_use(source, by_rating)
+        self._use = rating_use(source.model, source.ratings, by_rating)
         self.scene.style.use = self._use if by_rating else None
         self._largest = (0.0, 0.0) if recording is None else recording.largest
         self._plot: LoadPlot | None = None

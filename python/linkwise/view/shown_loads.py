@@ -16,8 +16,7 @@ from linkwise.view.shapes import Array
 if TYPE_CHECKING:
     from linkwise._core import Model
     from linkwise.loads.rating import Rating
-    from linkwise.result import Run
-    from linkwise.view.source import Source
+    from linkwise.results import Run
 
 _BLOCK_BYTES = 16 << 20
 _MOST_BLOCK = 64  # samples: what a playback passes in a second or two
@@ -108,9 +107,9 @@ class RatingUse:
         return np.asarray(np.fmax.reduce(uses))
 
 
-def rating_use(source: Source, needed: bool) -> RatingUse | None:
-    """The use of the source's ratings, None without any; InputError where they are `needed`."""
-    use = RatingUse(source.model, source.ratings)
+def rating_use(model: Model, ratings: Mapping[str, Rating], needed: bool) -> RatingUse | None:
+    """The use of these ratings, None without any; InputError where they are `needed`."""
+    use = RatingUse(model, ratings)
     if use.known:
         return use
     if needed:

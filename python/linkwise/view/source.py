@@ -13,14 +13,14 @@ import numpy as np
 from linkwise._core import InputError, Model, inverse_dynamics_loads
 from linkwise.io.complaint import near
 from linkwise.io.urdf_visuals import Looks, read_looks
-from linkwise.loads.samples import rows
+from linkwise.results.samples import rows
 from linkwise.scenario import load_ratings, load_scenario, ratings_in
 from linkwise.view.shapes import Array
 from linkwise.view.shown_loads import CauseLoads
 
 if TYPE_CHECKING:
     from linkwise.loads.rating import Rating
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 _BLOCK_BYTES = 64 << 20
 PathLike = str | os.PathLike[str]
@@ -187,7 +187,7 @@ def _load_model(path: Path, options: Options) -> tuple[Model, Path | None, Seque
 
 def _open_run(path: Path, options: Options) -> Source:
     from linkwise.record.machine import read_model
-    from linkwise.record.read import open_run
+    from linkwise.results import open_run
 
     run = open_run(path)
     if options.model is not None:

@@ -10,7 +10,7 @@ import linkwise as lw
 from linkwise.cli import demo
 from linkwise.cli.limits import beyond_limits
 from linkwise.cli.progress import describe
-from linkwise.time_loop import Progress
+from linkwise.simulation.time_loop import Progress
 
 # -- demo ----------------------------------------------------------------------------------------
 

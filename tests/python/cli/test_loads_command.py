@@ -100,7 +100,7 @@ def test_report(linkwise, run):
 
 def test_report_of_ten_joints_and_ten_seconds_is_small(tmp_path):
     pytest.importorskip("plotly")
-    from linkwise.loads.html import write_report
+    from linkwise.plot import write_report
 
     run = lw.simulate(lw.scenes.chain(10, damping=2.0), duration=10, every=0.01, q0=[0.4] * 10)
     path = write_report(run, tmp_path / "ten.html", {"summary": lw.loads.summary(run)})

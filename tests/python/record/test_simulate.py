@@ -10,8 +10,8 @@ import pytest
 import xarray as xr
 
 import linkwise as lw
-from linkwise import simulation, time_loop
 from linkwise.record import store
+from linkwise.simulation import simulate, time_loop
 
 
 @pytest.fixture
@@ -347,7 +347,7 @@ def test_simulates_in_another_thread(chain):
 
 def test_failure_message_names_outcome_time_and_joint(chain):
     ending = time_loop.Ending("not_finite", 1.25, "joint_2", "overflow; limit the step", {})
-    message = simulation.failure_message(chain, ending)
+    message = simulate.failure_message(chain, ending)
     assert message == (
         "simulation of 'chain' stopped at t = 1.25 s with outcome not_finite, joint 'joint_2': "
         "overflow; limit the step"
@@ -363,9 +363,9 @@ def test_run_scenario(tmp_path):
         "[model.chain]\nn_bodies = 2\n[initial]\nposition.joint_1 = 0.5\n"
         "[simulate]\nduration = 1.0\n[output]\nevery = 0.1\npath = 'out.zarr'\n"
     )
-    run = simulation.run_scenario(path)
+    run = simulate.run_scenario(path)
     assert run.path == tmp_path / "out.zarr"
     assert run.attrs["scenario"] == path.read_text()
     direct = lw.simulate(lw.scenes.chain(2), duration=1.0, every=0.1, q0=[0.5, 0])
     xr.testing.assert_equal(run.dataset, direct.dataset)
-    assert simulation.run_scenario(path, output=tmp_path / "x.zarr").path == tmp_path / "x.zarr"
+    assert simulate.run_scenario(path, output=tmp_path / "x.zarr").path == tmp_path / "x.zarr"

@@ -8,7 +8,7 @@ import pytest
 import linkwise as lw
 from helpers.browser import PATIENCE
 from helpers.loaded_arm import arm, profile
-from linkwise.loads.html import write_report
+from linkwise.plot import write_report
 
 pytest.importorskip("plotly", reason="the report needs plotly: pip install '.[report]'")
 imageio = pytest.importorskip("imageio.v3")

@@ -101,7 +101,7 @@ def test_ratings_come_from_the_scenario_or_a_file(linkwise, tmp_path):
         assert open_source(target, Options()).ratings == {"joint_2": lw.loads.Rating(force=5)}
         other = open_source(target, Options(ratings=tmp_path / "other.toml"))
         assert other.ratings == {"joint_1": lw.loads.Rating(moment=2)}
-        assert rating_use(other, True).known
+        assert rating_use(other.model, other.ratings, True).known
 
 
 def embedded(path):

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.loads.causes import along_total, split
+from linkwise.loads.energy import energy_balance
+from linkwise.results.samples import joint_position
 
 if TYPE_CHECKING:
     from linkwise.loads.causes import By
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 _HALVES = (("force", "N", ("fx", "fy", "fz")), ("moment", "N m", ("nx", "ny", "nz")))
 
@@ -36,8 +39,6 @@ class RunPlots:
 
     def loads(self, joint: str) -> Any:
         """Force and moment of a joint over time, by component (joint frame, joint point)."""
-        from linkwise.loads.samples import joint_position
-
         where = joint_position(self._run, joint)
         load = self._run.dataset["joint_load"].isel(joint=where)
         figure, axes = _figure(2)
@@ -56,9 +57,6 @@ class RunPlots:
         A cause's share is its part along the total, so that the shares add up to the size; a
         negative share relieves the joint.
         """
-        from linkwise.loads.causes import split
-        from linkwise.loads.samples import joint_position
-
         where = joint_position(self._run, joint)
         shares = split(self._run, by).isel(joint=where)
         times, causes = shares["time"].values, [str(c) for c in shares["cause"].values]
@@ -78,8 +76,6 @@ class RunPlots:
 
     def energy(self) -> Any:
         """Energies and works over time, and what does not add up."""
-        from linkwise.loads.energy import energy_balance
-
         balance = energy_balance(self._run)
         figure, axes = _figure(2)
         for name in balance.data_vars:
@@ -90,11 +86,3 @@ class RunPlots:
             axis.set_ylabel("energy [J]")
             axis.legend(loc="best", frameon=False)
         return figure
-
-
-def along_total(shares: Any) -> tuple[Any, Any]:
-    """Shares (time, cause, 3) along their sum (time, cause), and the size of the sum (time,)."""
-    total = shares.sum(axis=1)
-    size = np.linalg.norm(total, axis=-1)
-    direction = total / np.where(size > 0, size, 1.0)[:, None]
-    return np.einsum("tci,ti->tc", shares, direction), size

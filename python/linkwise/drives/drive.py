@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
-from linkwise.motion_table import LEAST_ROWS, NAMES, find_jump
+from linkwise.drives.jumps import LEAST_ROWS, NAMES, find_jump
 
 if TYPE_CHECKING:
     from linkwise._core import Model

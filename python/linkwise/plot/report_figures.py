@@ -15,15 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
-from linkwise.loads.causes import Split
+from linkwise.loads.causes import Split, along_total
 from linkwise.loads.engineering import derive, joint_directions
 from linkwise.loads.fatigue import load_duration, spectrum
-from linkwise.loads.samples import Array, blocks, joint_names, model_of, rows, select
-from linkwise.plots import along_total
+from linkwise.results.samples import Array, blocks, joint_names, model_of, rows, select
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 Figure = dict[str, Any]
 TIMES = "times"

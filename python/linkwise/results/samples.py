@@ -15,7 +15,7 @@ from linkwise.io.complaint import near
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results.run import Run
 
 Array = npt.NDArray[np.float64]
 # What is held in one go, in bytes: a run may be larger than memory.

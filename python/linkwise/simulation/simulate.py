@@ -14,15 +14,21 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import InputError
-from linkwise.arguments import number, optional_count, optional_number, sample_times, state_vector
 from linkwise.drives import Motion, as_drive, as_wrench
 from linkwise.io.complaint import near, shorten
 from linkwise.record.claim import check_target
 from linkwise.record.memory import MemoryRecord
 from linkwise.record.provenance import describe, provenance
 from linkwise.record.schema import Schema, build_schema
-from linkwise.result import Run
-from linkwise.time_loop import Ending, Progress, run_time_loop
+from linkwise.results import Run
+from linkwise.simulation.arguments import (
+    number,
+    optional_count,
+    optional_number,
+    sample_times,
+    state_vector,
+)
+from linkwise.simulation.time_loop import Ending, Progress, run_time_loop
 
 if TYPE_CHECKING:
     from linkwise._core import Model, Simulation

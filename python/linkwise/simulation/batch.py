@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import InputError, Model
-from linkwise.arguments import number, optional_count, sample_times
 from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TIME_ATTRS, Schema, build_schema
-from linkwise.result import Run
-from linkwise.simulation import SimulationInterrupted, check_driven
+from linkwise.results import Run
+from linkwise.simulation.arguments import number, optional_count, sample_times
+from linkwise.simulation.simulate import SimulationInterrupted, check_driven
 
 if TYPE_CHECKING:
     import xarray as xr

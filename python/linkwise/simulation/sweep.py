@@ -21,7 +21,7 @@ MOST_MEMBERS = 10_000
 
 def _simulate(scenario: Scenario) -> xr.Dataset:
     """One member, in a process of its own; its samples in memory."""
-    from linkwise.simulation import simulate
+    from linkwise.simulation.simulate import simulate
 
     model = scenario.load_model()
     arguments = scenario.simulate_arguments(model)

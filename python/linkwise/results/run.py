@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from linkwise._core import InputError
 
@@ -15,10 +14,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.plots import RunPlots
-
-# Samples of joint loads looked at in one go, in bytes: a run may be larger than memory.
-_BLOCK_BYTES = 64 << 20
 
 
 class Run:
@@ -123,53 +118,17 @@ class Run:
             self._model = read_model(self.path)
         return self._model
 
-    @property
-    def plot(self) -> RunPlots:
-        """Figures of this run: `run.plot.loads("elbow")`, `.split("elbow")`, `.energy()`."""
-        from linkwise.plots import RunPlots
+    # Loads and figures are functions of a run, in rooms above this one: imported when asked for.
 
-        return RunPlots(self)
+    @property
+    def plot(self) -> Any:
+        """Figures of this run: `run.plot.loads("elbow")`, `.split("elbow")`, `.energy()`."""
+        return import_module("linkwise.plot").RunPlots(self)
 
     def peak_loads(self) -> xr.Dataset:
-        """Largest force and moment that each joint carries, and when.
-
-        Returns:
-            Dataset over `joint`: `force` [N] and `moment` [N m] (magnitudes of the joint load's two
-            halves, the moment about the joint point) with `force_time` and `moment_time` [s].
-
-        Raises:
-            InputError: the run holds no joint loads or no samples.
-        """
-        import xarray as xr
-
-        from linkwise.loads.samples import rows as read_rows
-
-        if "joint_load" not in self.dataset:
-            raise InputError('run holds no joint loads; record the quantity "joint_load"')
-        load = self.dataset["joint_load"]
-        times = self.dataset["time"].values
-        if times.size == 0:
-            raise InputError("run holds no samples: it stopped before the first was written")
-        count = load.sizes["joint"]
-        largest = np.full((2, count), -1.0)
-        when = np.zeros((2, count))
-        rows = max(1, _BLOCK_BYTES // max(1, 48 * count))
-        for start in range(0, times.size, rows):
-            block = read_rows(self, "joint_load", slice(start, start + rows))
-            block = block.reshape(-1, count, 2, 3)
-            size = np.linalg.norm(block, axis=-1)
-            at = np.argmax(size, axis=0)
-            peak = np.take_along_axis(size, at[None], axis=0)[0].T
-            better = peak > largest
-            largest[better] = peak[better]
-            when[better] = times[start + at.T][better]
-        data = {}
-        for k, (name, units) in enumerate((("force", "N"), ("moment", "N m"))):
-            attrs = {"long_name": f"largest joint {name}", "units": units}
-            data[name] = ("joint", largest[k], attrs)
-            at_attrs = {"long_name": f"time of the largest joint {name}", "units": "s"}
-            data[f"{name}_time"] = ("joint", when[k], at_attrs)
-        return xr.Dataset(data, coords={"joint": ("joint", load["joint"].values)})
+        """Largest force and moment of each joint, and when: `linkwise.loads.peak_loads`."""
+        found: xr.Dataset = import_module("linkwise.loads").peak_loads(self)
+        return found
 
     def to_netcdf(self, path: str | os.PathLike[str]) -> Path:
         """Write everything to one NetCDF-4 file (also an HDF5 file); replaces an existing file."""

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
-from linkwise.loads.figures import energy_figure, joint_figures, packed
+from linkwise.plot.report_figures import energy_figure, joint_figures, packed
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.result import Run
+    from linkwise.results import Run
 
 # Joints with figures, the most loaded first: each takes some 200 kB.
 MOST_JOINTS = 16

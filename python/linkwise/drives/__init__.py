@@ -1,0 +1,33 @@
+"""How joints are driven and bodies are loaded: the drives and wrenches of `simulate`."""
+
+from linkwise.drives.drive import (
+    PD,
+    Drive,
+    Frame,
+    Free,
+    Interpolation,
+    Locked,
+    Motion,
+    Spring,
+    Table,
+    Torque,
+    Wrench,
+    as_drive,
+    as_wrench,
+)
+
+__all__ = [
+    "PD",
+    "Drive",
+    "Frame",
+    "Free",
+    "Interpolation",
+    "Locked",
+    "Motion",
+    "Spring",
+    "Table",
+    "Torque",
+    "Wrench",
+    "as_drive",
+    "as_wrench",
+]

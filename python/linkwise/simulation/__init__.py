@@ -1,0 +1,1 @@
+"""Simulating one model, many members of one, and scenarios with many values."""
