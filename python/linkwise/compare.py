@@ -201,7 +201,7 @@ def compare(
     fails, that does not suit the model, or that needs more than `time_limit` seconds stays in the
     table and says so.
     """
-    options = {
+    options: dict[str, Any] = {
         "tolerance": number("tolerance", tolerance),
         "stop": stop,
         "max_iterations": max_iterations,

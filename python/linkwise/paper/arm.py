@@ -76,7 +76,8 @@ class Protocol:
 
 
 #: Section 5 of the paper.
-PAPER_PROTOCOL = Protocol("paper", "cubic", "paper", 1e-7)
+PAPER_SOLVER_TOLERANCE = 1e-7
+PAPER_PROTOCOL = Protocol("paper", "cubic", "paper", PAPER_SOLVER_TOLERANCE)
 #: What linkwise does better: projection of the last solutions, and an estimate of the error itself
 #: that is measured by what the integrator can notice.
 OUR_PROTOCOL = Protocol("ours", "projection", "energy_norm", None, history=16)

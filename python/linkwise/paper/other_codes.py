@@ -13,7 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise import _core, scenes
-from linkwise.paper.arm import DURATION, MANEUVERS, MOST_ITERATIONS, PAPER_PROTOCOL, Maneuver
+from linkwise.paper.arm import (
+    DURATION,
+    MANEUVERS,
+    MOST_ITERATIONS,
+    PAPER_PROTOCOL,
+    PAPER_SOLVER_TOLERANCE,
+    Maneuver,
+)
 from linkwise.paper.published import TABLE_2
 
 if TYPE_CHECKING:
@@ -51,7 +58,7 @@ def _run(
         solver=solver,
         initial_guess=PAPER_PROTOCOL.initial_guess,
         stop=PAPER_PROTOCOL.stop,
-        tolerance=PAPER_PROTOCOL.solver_tolerance,
+        tolerance=PAPER_SOLVER_TOLERANCE,
         max_iterations=MOST_ITERATIONS,
     )
     iterations: list[int] = []

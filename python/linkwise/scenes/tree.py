@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -64,8 +64,8 @@ def tree(
     return builder.build()
 
 
-def _axis(joint: str, directions: np.ndarray, i: int, damping: float) -> dict[str, object]:
-    options: dict[str, object] = {"damping": damping}
+def _axis(joint: str, directions: np.ndarray, i: int, damping: float) -> dict[str, Any]:
+    options: dict[str, Any] = {"damping": damping}
     axis = directions[i % len(directions)]
     if joint == "universal":
         options["axes"] = [axis, directions[(i + 1) % len(directions)]]

@@ -158,7 +158,7 @@ def simulate_batch(
     fixed = [entry["name"] for entry in _core.integrators() if entry["fixed_step"]]
     if integrator not in fixed:
         raise InputError(f"integrator: a batch takes {' or '.join(fixed)}, not {integrator!r}")
-    options = {"integrator": integrator, "step": number("step", step)}
+    options: dict[str, Any] = {"integrator": integrator, "step": number("step", step)}
     simulations = []
     for one in models:
         by_joint, by_body = check_driven(one, drives, wrenches)

@@ -236,7 +236,7 @@ def simulate(
         raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
     if output is not None:
         check_target(output)
-    options = {
+    options: dict[str, Any] = {
         "integrator": integrator,
         "tolerance": number("tolerance", tolerance),
         "step_tolerance": optional_number("step_tolerance", step_tolerance),
