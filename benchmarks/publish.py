@@ -5,7 +5,7 @@
 Writes benchmarks/results/NAME (bench.json, bench.md, figures) by `linkwise bench`, and there too
 what instructions.py, many_simulations.py and huge_chains.py beside this file find; then replaces
 the text between the marks <!-- bench-table --> in README.md and <!-- bench-targets -->,
-<!-- many-simulations --> and <!-- huge-chains --> in docs/performance.md. With --no-run it takes
+<!-- many-simulations --> and <!-- huge-chains --> in docs/benchmarking.md. With --no-run it takes
 the results that are there.
 """
 
@@ -68,7 +68,7 @@ def main() -> None:
     line = conditions_line(result, arguments.name, "benchmarks/results")
     put(ROOT / "README.md", "bench-table", f"{table}\n\n{line}")
     line = conditions_line(result, arguments.name, "../benchmarks/results")
-    performance = ROOT / "docs" / "performance.md"
+    performance = ROOT / "docs" / "benchmarking.md"
     put(performance, "bench-targets", f"{target_table(result.targets)}\n\n{line}")
     for name in OTHERS[1:]:
         text = (folder / f"{name}.md").read_text(encoding="utf-8")

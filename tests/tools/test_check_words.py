@@ -22,7 +22,7 @@ def check(root, path, text):
         ("a.md", "It takes one dispatch a\nrun.\n", "one dispatch a run: write"),
         ("a.hpp", "// one reciprocal\n// a joint\n", "one reciprocal a joint: write"),
         ("a.py", 'print("2000 bytes a link")\n', "2000 bytes a link"),
-        ("a.md", "where there is none, and where b is none.\n", "is none: write"),
+        ("a.md", "where b is none.\n", "is none: write"),
         ("a.cpp", "struct GiftOf {};\n", "GiftOf: give it the field's name"),
         ("a.py", "first_seat = 1\n", "first_seat: give it"),
     ],
@@ -36,7 +36,7 @@ def test_a_bad_word_is_found(tmp_path, path, text, problem):
     [
         ("a.cpp", "// See base/error.hpp and NAME.hpp.\nint pitch, outlook;\n"),
         ("a.md", "`src/linkwise/base`, <https://example.org/b/c.py>, `my_robot.urdf`\n"),
-        ("a.md", "Each one is a body; two of a joint, once in a call, 30 frames a second.\n"),
+        ("a.md", "There is none. Each one is a body; two of a joint, once in a call, 30 frames a second.\n"),
         ("a.md", "```text\nmissing.py\n```\n[page](missing.md)\n"),
         ("a.py", '# It looks like a gift.\nx = "missing.py"\ncamera.look_at = 1\n'),
     ],
