@@ -44,7 +44,7 @@ JOINING = (
 BANNED = {
     rf"\b(?:{COUNT})(?:\s+(?!(?:{JOINING})\b)[a-z][\w-]*)?\s+an?\s+(?:{THING})\b": 'write "per"',
     rf"\b(?:{UNIT})\s+an?\s+(?:{THING})\b": 'write "per"',
-    r"(?<!there\s)\b(?:is|are|was)\s+none\b(?!\s+of)": 'write "there is no ..."',
+    r"(?<![Tt]here\s)\b(?:is|are|was)\s+none\b(?!\s+of)": 'write "there is no ..."',
 }
 #: Parts of identifiers that are no terms of the field.
 IDENTIFIERS = {"gift", "gifts", "seat", "seats", "pit", "pits", "wish", "wishes", "look", "looks"}
