@@ -48,7 +48,7 @@ nb::dict simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, nb
   column("energy", "potential_energy", {}, out.potential_energy);
   const int team = threads_of(threads, 1 << 20);
   Interrupt interrupt;
-  std::vector<MemberEnd> ends;
+  std::vector<Ending> ends;
   {
     const nb::gil_scoped_release release;
     ends = simulate_batch(all, per, start, {times.data, n}, out, team,
@@ -59,7 +59,7 @@ nb::dict simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, nb
   nb::list outcomes;
   for (size_t i = 0; i < members; ++i) {
     end_times.data[i] = ends[i].time;
-    outcomes.append(nb::str(ends[i].outcome.data(), ends[i].outcome.size()));
+    outcomes.append(std::string(to_string(ends[i].outcome)));
   }
   columns["outcome"] = outcomes;
   columns["stop_time"] = end_times.array;

@@ -86,12 +86,12 @@ nb::dict advance(PySimulation& self, nb::handle times_in, const nb::object& quan
     nb::object array = nb::cast(to_numpy(values));
     out[names[k]] = k == 3 ? array : nb::object(array.attr("astype")("int64"));
   }
-  const Stop& stop = simulation.stop();
-  out["outcome"] = interrupted ? "interrupted" : stop.outcome;
+  const Ending& stop = simulation.ending();
+  out["outcome"] = std::string(to_string(interrupted ? Outcome::interrupted : stop.outcome));
   out["stop_time"] = stop.ok() ? (done ? times.data()[done - 1] : 0.0) : stop.time;
   out["stop_joint"] =
       stop.joint >= 0 ? nb::object(nb::cast(model->joints[stop.joint].name)) : nb::none();
-  out["message"] = stop.message;
+  out["message"] = stop.text;
   return out;
 }
 

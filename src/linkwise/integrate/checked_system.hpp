@@ -20,10 +20,11 @@ class CheckedSystem {
  public:
   explicit CheckedSystem(OdeSystem& system) : system_(&system) {}
 
-  StepStatus evaluate(double t, const double* y, double* ydot) {
+  Outcome evaluate(double t, const double* y, double* ydot) {
     ++evaluations;
-    if (!system_->evaluate(t, y, ydot)) return StepStatus::evaluation_failed;
-    return all_finite({ydot, size()}) ? StepStatus::ok : StepStatus::not_finite;
+    const Outcome outcome = system_->evaluate(t, y, ydot);
+    if (outcome != Outcome::converged) return outcome;
+    return all_finite({ydot, size()}) ? Outcome::converged : Outcome::not_finite;
   }
 
   std::size_t size() const { return static_cast<std::size_t>(system_->size()); }

@@ -85,26 +85,6 @@ void check(const IntegratorEntry& entry, const IntegratorOptions& options) {
 
 }  // namespace
 
-std::string_view describe(StepStatus status) {
-  switch (status) {
-    case StepStatus::ok:
-      return "the step was accepted";
-    case StepStatus::evaluation_failed:
-      return "the accelerations could not be computed, however small the step; look at the state "
-             "and the drives at this time";
-    case StepStatus::not_finite:
-      return "the motion stopped being finite; look for an unstable drive, a huge force, or take a "
-             "smaller step";
-    case StepStatus::step_too_small:
-      return "no step, however small, meets the tolerance; look for a jump in a drive or a "
-             "singular motion at this time, loosen the tolerance, or try bdf";
-    case StepStatus::too_many_steps:
-      return "the allowed number of steps is used up; raise max_steps, loosen the tolerance, or "
-             "try bdf if the system is stiff";
-  }
-  return "unknown status";
-}
-
 std::span<const IntegratorEntry> integrator_registry() { return entries; }
 
 const IntegratorEntry& find_integrator(std::string_view name) {

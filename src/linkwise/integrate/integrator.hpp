@@ -4,6 +4,8 @@
 #include <span>
 #include <string_view>
 
+#include "linkwise/base/outcome.hpp"
+
 namespace linkwise {
 
 /// The equations of motion as the integrators see them: ydot = f(t, y) with y = [q; v].
@@ -17,8 +19,9 @@ struct OdeSystem {
   virtual int size() const = 0;           ///< length of y
   virtual int position_size() const = 0;  ///< length of q; v is the rest
 
-  /// Writes f(t, y); false when it cannot be evaluated (not finite, or a solver failed).
-  virtual bool evaluate(double t, const double* y, double* ydot) = 0;
+  /// Writes f(t, y). An outcome other than `converged` says why it cannot be evaluated; integrators
+  /// may then try a smaller step, and end with that outcome where none helps.
+  virtual Outcome evaluate(double t, const double* y, double* ydot) = 0;
 
   /// Writes qdot for the velocities v, which is not v where a joint has a quaternion.
   virtual void position_rates(const double* q, const double* v, double* qdot) = 0;
@@ -42,17 +45,6 @@ struct IntegratorOptions {
   long max_steps = 0;               ///< for one start(); 0: no bound
 };
 
-enum class StepStatus {
-  ok,
-  evaluation_failed,  ///< f could not be evaluated, however small the step
-  not_finite,         ///< f or y became NaN or infinite
-  step_too_small,     ///< no step, however small, passes the error test
-  too_many_steps,     ///< IntegratorOptions::max_steps are taken
-};
-
-/// What happened and what to do about it, in one sentence.
-std::string_view describe(StepStatus status);
-
 struct IntegratorStatistics {
   long steps = 0;
   long evaluations = 0;
@@ -73,9 +65,9 @@ class Integrator {
   virtual void start(double t0, std::span<const double> y0) = 0;
 
   /// Takes one accepted step from time(), past t_limit where the method's own step leads there: the
-  /// steps do not depend on where output is asked for. After a status other than ok, time() and the
-  /// state there are those of the last accepted step and only start() may follow.
-  virtual StepStatus step(double t_limit) = 0;
+  /// steps do not depend on where output is asked for. After an outcome other than `converged`,
+  /// time() and the state there are those of the last accepted step and only start() may follow.
+  virtual Outcome step(double t_limit) = 0;
 
   /// Writes y(t), normalised, for t within the last step (or at the start, before the first one).
   virtual void interpolate(double t, std::span<double> y) = 0;

@@ -74,7 +74,7 @@ class Group final : private OdeSystem {
     }
   }
 
-  const std::vector<MemberEnd>& ends() const { return ends_; }
+  const std::vector<Ending>& ends() const { return ends_; }
 
  private:
   size_t nq() const { return s_.model.nq(); }
@@ -86,12 +86,9 @@ class Group final : private OdeSystem {
   bool reach(double t, const std::function<bool()>& go_on) {
     while (integrator_->time() < t) {
       if (!any_alive()) return false;
-      if (!go_on()) return end_all("interrupted");
-      const StepStatus status = integrator_->step(t);
-      if (status != StepStatus::ok && any_alive())
-        return end_all(status == StepStatus::step_too_small   ? "step_too_small"
-                       : status == StepStatus::too_many_steps ? "too_many_steps"
-                                                              : "not_finite");
+      if (!go_on()) return end_all(Outcome::interrupted);
+      const Outcome outcome = integrator_->step(t);
+      if (outcome != Outcome::converged && any_alive()) return end_all(outcome);
     }
     return any_alive();
   }
@@ -101,16 +98,17 @@ class Group final : private OdeSystem {
       if (alive) return true;
     return false;
   }
-  void end(size_t i, std::string_view outcome) {
-    if (alive_[i]) ends_[i] = {outcome, integrator_ ? integrator_->time() : 0};
+  void end(size_t i, Outcome outcome) {
+    if (alive_[i])
+      ends_[i] = {outcome, integrator_ ? integrator_->time() : 0, -1, describe(outcome)};
     alive_[i] = false;
   }
-  bool end_all(std::string_view outcome) {
+  bool end_all(Outcome outcome) {
     for (size_t i = 0; i < n_; ++i) end(i, outcome);
     return false;
   }
 
-  bool evaluate(double t, const double* y, double* ydot) override {
+  Outcome evaluate(double t, const double* y, double* ydot) override {
     if (s_.any_motion || !all_alive()) {
       rows_.assign(y, y + size());
       stand_in(rows_.data());
@@ -128,7 +126,7 @@ class Group final : private OdeSystem {
         rest_imposed(s_.model, s_.drives, ydot + i * nq(), dv + i * nv());
       }
     }
-    return any_alive();
+    return any_alive() ? Outcome::converged : ends_[0].outcome;
   }
 
   bool all_alive() const {
@@ -180,9 +178,9 @@ class Group final : private OdeSystem {
       double* row = du + i * nv();
       double* load = loads ? loads + i * n_load() : nullptr;
       if (!sound && batch_.forward_dynamics(1, input(y, i), row, load) >= 0)
-        end(i, "not_positive_definite");
+        end(i, Outcome::not_positive_definite);
       for (size_t k = 0; k < nv(); ++k)
-        if (!(std::abs(row[k]) < largest_acceleration)) end(i, "not_finite");
+        if (!(std::abs(row[k]) < largest_acceleration)) end(i, Outcome::not_finite);
     }
   }
 
@@ -258,7 +256,7 @@ class Group final : private OdeSystem {
   BatchEvaluator batch_;
   std::unique_ptr<BatchEvaluator> inverse_;
   std::unique_ptr<Integrator> integrator_;
-  std::vector<MemberEnd> ends_;
+  std::vector<Ending> ends_;
   std::vector<bool> alive_;
   const double* constant_;
   std::vector<double> tau_, drive_, a_, external_, poses_, y_, rows_, du_, loads_, total_;
@@ -296,11 +294,11 @@ void check_batch(const Simulation& simulation) {
       throw InputError("wrenches: a function is given; a batch takes numbers and tables");
 }
 
-std::vector<MemberEnd> simulate_batch(std::span<const Simulation* const> simulations,
-                                      size_t per_simulation, const BatchStart& start,
-                                      std::span<const double> times, const Sample& samples,
-                                      int threads, const std::function<bool()>& go_on) {
-  std::vector<MemberEnd> ends(simulations.size() * per_simulation);
+std::vector<Ending> simulate_batch(std::span<const Simulation* const> simulations,
+                                   size_t per_simulation, const BatchStart& start,
+                                   std::span<const double> times, const Sample& samples,
+                                   int threads, const std::function<bool()>& go_on) {
+  std::vector<Ending> ends(simulations.size() * per_simulation);
   std::vector<std::unique_ptr<const Shared>> shared;
   for (size_t m = 0; m < simulations.size(); ++m) {
     check_batch(*simulations[m]);

@@ -4,7 +4,6 @@
 // and groups share nothing, so the number of threads does not change a bit.
 #include <functional>
 #include <span>
-#include <string_view>
 
 #include "linkwise/simulate/simulation.hpp"
 
@@ -16,12 +15,6 @@ struct BatchStart {
   const double* tau = nullptr;  ///< constant, beside the drives; null: none
 };
 
-/// How one member ended, and when.
-struct MemberEnd {
-  std::string_view outcome = "converged";
-  double time = 0;
-};
-
 /// InputError where a simulation has what a batch cannot do: an integrator that chooses its steps,
 /// functions of Python as drives.
 void check_batch(const Simulation& simulation);
@@ -29,10 +22,10 @@ void check_batch(const Simulation& simulation);
 /// Simulates from time 0 on. Model, drives, wrenches and integrator are those of the simulations,
 /// each of which has `per_simulation` members; the method is articulated_body. Arrays of `samples`
 /// are [member][time][...], NaN after a member's end: a member that fails ends alone. `go_on` is
-/// asked at every step, from any thread; once it is false, members under way end as "interrupted".
-std::vector<MemberEnd> simulate_batch(std::span<const Simulation* const> simulations,
-                                      size_t per_simulation, const BatchStart& start,
-                                      std::span<const double> times, const Sample& samples,
-                                      int threads, const std::function<bool()>& go_on);
+/// asked at every step, from any thread; once it is false, members under way end as `interrupted`.
+std::vector<Ending> simulate_batch(std::span<const Simulation* const> simulations,
+                                   size_t per_simulation, const BatchStart& start,
+                                   std::span<const double> times, const Sample& samples,
+                                   int threads, const std::function<bool()>& go_on);
 
 }  // namespace linkwise

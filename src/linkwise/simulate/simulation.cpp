@@ -100,7 +100,7 @@ void Simulation::start(double t0, const double* q0, const double* v0) {
   normalise(y_.data());
   iterations_ = 0;
   trace_.clear();
-  stop_ = pending_ = Stop{};
+  ending_ = failure_ = Ending{};
   if (solver_tolerance_) solver_tolerance_->start(t0);
   integrator_ = make_integrator(options_.integrator, *this, options_.integration);
   integrator_->start(t0, y_);
@@ -138,12 +138,12 @@ SweepInput<double> Simulation::applied_forces(double t, const double* q, const d
   return in;
 }
 
-bool Simulation::accelerations(DynamicsMethod& method, double t, const double* q, const double* v,
-                               double* du, double* loads) {
+Outcome Simulation::accelerations(DynamicsMethod& method, double t, const double* q,
+                                  const double* v, double* du, double* loads) {
   const SweepInput<double> in = applied_forces(t, q, v);
   const auto evaluation = [&] { return method.evaluate(t, in, du, loads); };
   const bool recorded = keeps_trace_ && &method == method_.get();
-  return accepts(t, recorded ? traced(t, evaluation) : evaluation(), du, model_->nv());
+  return judge(t, recorded ? traced(t, evaluation) : evaluation(), du, model_->nv());
 }
 
 template <class Evaluation>
@@ -155,44 +155,44 @@ DynamicsReport Simulation::traced(double t, Evaluation&& evaluation) {
   return report;
 }
 
-bool Simulation::accepts(double t, const DynamicsReport& report, const double* du, int n) {
+Outcome Simulation::judge(double t, const DynamicsReport& report, const double* du, int n) {
   iterations_ += report.iterations;
   double sum = 0;
   for (int i = 0; i < n; ++i) sum += du[i];
   // Where rounding keeps the forces from what the error test would like, the fixed tolerance does.
   const bool good_enough = solver_tolerance_ && report.outcome == Outcome::stagnated &&
                            report.error_estimate <= options_.dynamics.solver_options.tolerance;
-  if ((report.ok() || good_enough) && std::isfinite(sum)) return true;
+  if ((report.ok() || good_enough) && std::isfinite(sum)) return Outcome::converged;
   record_failure(t, report, du);
-  return false;
+  return failure_.outcome;
 }
 
 void Simulation::record_failure(double t, const DynamicsReport& report, const double* du) {
   const Model& m = *model_;
-  pending_.time = t;
-  pending_.joint = -1;
+  failure_.time = t;
+  failure_.joint = -1;
   Outcome outcome = report.outcome;
   if (report.ok()) outcome = Outcome::not_finite;
   // What was given to a joint before what came out at it: one bad torque spoils all accelerations.
   const auto name_first = [&](const std::vector<double>& given, int first, int n, int j) {
     for (int i = first; i < first + n && !given.empty(); ++i)
-      if (pending_.joint < 0 && !std::isfinite(given[i])) pending_.joint = j;
+      if (failure_.joint < 0 && !std::isfinite(given[i])) failure_.joint = j;
   };
   for (int j = 0; j < m.n_joints() && report.body < 0; ++j) {
     name_first(tau_, m.joints[j].v, m.joints[j].nv, j);
     name_first(external_, 6 * j, 6, j);
   }
-  for (int j = 0; j < m.n_joints() && pending_.joint < 0; ++j) {
+  for (int j = 0; j < m.n_joints() && failure_.joint < 0; ++j) {
     const JointInfo& info = m.joints[j];
-    if (report.body >= 0 && info.body == report.body && info.last_of_body) pending_.joint = j;
+    if (report.body >= 0 && info.body == report.body && info.last_of_body) failure_.joint = j;
     for (int i = info.v; i < info.v + info.nv && report.body < 0; ++i)
-      if (!std::isfinite(du[i])) pending_.joint = j;
+      if (!std::isfinite(du[i])) failure_.joint = j;
   }
-  pending_.outcome = std::string(to_string(outcome));
-  pending_.message = std::string(message(outcome)) + "; " + std::string(remedy(outcome));
+  failure_.outcome = outcome;
+  failure_.text = describe(outcome);
 }
 
-bool Simulation::evaluate(double t, const double* y, double* ydot) {
+Outcome Simulation::evaluate(double t, const double* y, double* ydot) {
   const Model& m = *model_;
   if (solver_tolerance_) solver_tolerance_->set(t);
   if (any_motion_) return evaluate_imposed(t, y, ydot);
@@ -203,18 +203,18 @@ bool Simulation::evaluate(double t, const double* y, double* ydot) {
   const SweepInput<double> in = applied_forces(t, q, rates_.data());
   const auto evaluation = [&] { return body_velocities_->evaluate(t, in, v, dv); };
   const DynamicsReport report = keeps_trace_ ? traced(t, evaluation) : evaluation();
-  return accepts(t, report, dv, body_velocities_->size());
+  return judge(t, report, dv, body_velocities_->size());
 }
 
-bool Simulation::evaluate_imposed(double t, const double* y, double* ydot) {
+Outcome Simulation::evaluate_imposed(double t, const double* y, double* ydot) {
   const Model& m = *model_;
   std::copy(y, y + size(), imposed_.begin());
   impose_motion(t, imposed_.data());
   const double *q = imposed_.data(), *v = q + m.nq();
   position_rates(q, v, ydot);
-  const bool ok = accelerations(*method_, t, q, v, ydot + m.nq(), nullptr);
+  const Outcome outcome = accelerations(*method_, t, q, v, ydot + m.nq(), nullptr);
   rest_imposed(m, drives_, ydot, ydot + m.nq());
-  return ok;
+  return outcome;
 }
 
 void Simulation::impose_motion(double t, double* y) {
@@ -242,27 +242,15 @@ void Simulation::accepted(double t, const double* y) {
 }
 
 bool Simulation::advance(double t, const Sample& sample) {
-  if (!stop_.ok()) return false;
+  if (!ending_.ok()) return false;
   while (integrator_->time() < t) {
-    if (interrupted_ && interrupted_()) {
-      stop_.outcome = "interrupted";
-      stop_.time = integrator_->time();
-      return false;
-    }
-    const StepStatus status = integrator_->step(t);
-    if (status == StepStatus::ok) continue;
-    stop_.time = integrator_->time();
-    if ((status == StepStatus::evaluation_failed || status == StepStatus::not_finite) &&
-        !pending_.ok()) {
-      stop_ = pending_;
-    } else {
-      stop_.outcome = status == StepStatus::not_finite       ? "not_finite"
-                      : status == StepStatus::step_too_small ? "step_too_small"
-                      : status == StepStatus::too_many_steps ? "too_many_steps"
-                                                             : "evaluation_failed";
-      stop_.message = std::string(describe(status));
-      if (!pending_.ok()) stop_.joint = pending_.joint;
-    }
+    Outcome outcome = Outcome::interrupted;
+    if (!interrupted_ || !interrupted_()) outcome = integrator_->step(t);
+    if (outcome == Outcome::converged) continue;
+    // What failed within the step says more than that it failed.
+    ending_ = failure_.outcome == outcome
+                  ? failure_
+                  : Ending{outcome, integrator_->time(), failure_.joint, describe(outcome)};
     return false;
   }
   integrator_->interpolate(t, y_);
@@ -282,10 +270,10 @@ bool Simulation::write_sample(double t, const Sample& s) {
   if (s.velocity) std::copy(v, v + m.nv(), s.velocity);
   if (s.acceleration || s.joint_load || s.drive_torque || s.external) {
     const long iterations = iterations_;
-    const bool ok = accelerations(*output_method_, t, q, v, du_.data(), s.joint_load);
+    const Outcome outcome = accelerations(*output_method_, t, q, v, du_.data(), s.joint_load);
     iterations_ = iterations;  // those of the record are not the integration's
-    if (!ok) {
-      stop_ = pending_;
+    if (outcome != Outcome::converged) {
+      ending_ = failure_;
       return false;
     }
     output_method_->accepted(t);

@@ -58,15 +58,6 @@ struct EvaluationTrace {
   bool accepted = false;  ///< the last evaluation of an accepted step
 };
 
-/// Why a run stopped early.
-struct Stop {
-  std::string outcome = "converged";
-  double time = 0;
-  int joint = -1;
-  std::string message;
-  bool ok() const { return outcome == "converged"; }
-};
-
 class Simulation : private OdeSystem {
  public:
   Simulation(std::shared_ptr<const Model> model, SimulationOptions options);
@@ -80,13 +71,13 @@ class Simulation : private OdeSystem {
   void start(double t0, const double* q0, const double* v0);
 
   /// Steps until t is covered, then writes the sample there. False when the run stopped: see
-  /// stop().
+  /// ending().
   bool advance(double t, const Sample& sample);
 
-  const Stop& stop() const { return stop_; }
+  const Ending& ending() const { return ending_; }
   SimulationStatistics statistics() const;
 
-  /// Asked at every step: once it is true, the run stops with the outcome "interrupted".
+  /// Asked at every step: once it is true, the run stops with the outcome `interrupted`.
   void set_interrupt(std::function<bool()> interrupted) { interrupted_ = std::move(interrupted); }
 
   /// From the next start on, records every evaluation that the integrator asks for.
@@ -105,22 +96,22 @@ class Simulation : private OdeSystem {
     return model_->nq() + (body_velocities_ ? body_velocities_->size() : model_->nv());
   }
   int position_size() const override { return model_->nq(); }
-  bool evaluate(double t, const double* y, double* ydot) override;
+  Outcome evaluate(double t, const double* y, double* ydot) override;
   void position_rates(const double* q, const double* v, double* qdot) override;
   void normalise(double* y) override;
   void accepted(double t, const double* y) override;
 
   SweepInput<double> applied_forces(double t, const double* q, const double* v);
-  bool accelerations(DynamicsMethod& method, double t, const double* q, const double* v, double* du,
-                     double* loads);
+  Outcome accelerations(DynamicsMethod& method, double t, const double* q, const double* v,
+                        double* du, double* loads);
   template <class Evaluation>
   DynamicsReport traced(double t, Evaluation&& evaluation);
   bool follows_error_test() const;
-  bool accepts(double t, const DynamicsReport& report, const double* du, int n);
+  Outcome judge(double t, const DynamicsReport& report, const double* du, int n);
   void record_failure(double t, const DynamicsReport& report, const double* du);
   bool write_sample(double t, const Sample& sample);
   void impose_motion(double t, double* y);
-  bool evaluate_imposed(double t, const double* y, double* ydot);
+  Outcome evaluate_imposed(double t, const double* y, double* ydot);
   void write_holding_torques(const double* q, const double* v, double* drive_torque);
 
   std::shared_ptr<const Model> model_;   ///< as the user sees it
@@ -142,7 +133,7 @@ class Simulation : private OdeSystem {
   bool keeps_trace_ = false;
   std::vector<EvaluationTrace> trace_;
   std::function<bool()> interrupted_;
-  Stop stop_, pending_;
+  Ending ending_, failure_;
 };
 
 }  // namespace linkwise

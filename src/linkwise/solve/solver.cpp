@@ -13,36 +13,6 @@ namespace {
 template <class Enum, std::size_t count>
 using NameTable = std::array<std::pair<Enum, std::string_view>, count>;
 
-struct OutcomeText {
-  Outcome outcome;
-  std::string_view name, message, remedy;
-};
-
-constexpr OutcomeText outcomes[] = {
-    {Outcome::converged, "converged", "the solution meets the tolerance", ""},
-    {Outcome::reached_max_iterations, "reached_max_iterations",
-     "the iteration limit was reached before the tolerance was met",
-     "use solver 'thomas' or 'two_level', allow more iterations, or loosen the tolerance"},
-    {Outcome::not_positive_definite, "not_positive_definite", "the matrix is not positive definite",
-     "check the inertias: each must be positive definite, and no two joints may constrain the same "
-     "direction of the same two bodies"},
-    {Outcome::not_finite, "not_finite", "a number in the system or in the iteration is not finite",
-     "check masses, inertias, drives and the state for values that are infinite or far too large"},
-    {Outcome::stagnated, "stagnated",
-     "rounding errors keep the iteration from meeting the tolerance",
-     "loosen the tolerance, or use the articulated_body method, which loses no digits on long "
-     "straight chains"},
-    {Outcome::diverged, "diverged", "the iteration diverges: its spectral radius is above 1",
-     "use a solver that converges for every mechanism: 'conjugate_gradient', 'gauss_seidel' or "
-     "'thomas'"},
-};
-
-const OutcomeText& find(Outcome outcome) {
-  for (const OutcomeText& text : outcomes)
-    if (text.outcome == outcome) return text;
-  return outcomes[0];
-}
-
 constexpr NameTable<StopRule, 3> stop_rules{{{StopRule::paper, "paper"},
                                              {StopRule::residual, "residual"},
                                              {StopRule::energy_norm, "energy_norm"}}};
@@ -78,10 +48,6 @@ std::string number(double value) {
 }
 
 }  // namespace
-
-std::string_view to_string(Outcome outcome) { return find(outcome).name; }
-std::string_view message(Outcome outcome) { return find(outcome).message; }
-std::string_view remedy(Outcome outcome) { return find(outcome).remedy; }
 
 std::string_view to_string(StopRule rule) { return to_name(stop_rules, rule); }
 StopRule stop_rule_from_name(std::string_view name) {

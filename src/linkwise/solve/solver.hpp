@@ -6,26 +6,11 @@
 #include <string>
 #include <string_view>
 
+#include "linkwise/base/outcome.hpp"
 #include "linkwise/exec/executor.hpp"
 #include "linkwise/linear/block_tree.hpp"
 
 namespace linkwise {
-
-/// How a solve ended.
-enum class Outcome {
-  converged,
-  reached_max_iterations,
-  not_positive_definite,
-  not_finite,
-  stagnated,
-  diverged,
-};
-
-std::string_view to_string(Outcome outcome);
-/// What happened, one sentence.
-std::string_view message(Outcome outcome);
-/// What the user can do about it, one sentence; empty for `converged`.
-std::string_view remedy(Outcome outcome);
 
 /// When an iteration stops. See stop_test.hpp.
 enum class StopRule {

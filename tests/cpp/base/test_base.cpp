@@ -1,3 +1,4 @@
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -7,6 +8,7 @@
 #include "linkwise/base/assert.hpp"
 #include "linkwise/base/error.hpp"
 #include "linkwise/base/memory.hpp"
+#include "linkwise/base/outcome.hpp"
 
 namespace linkwise {
 namespace {
@@ -47,6 +49,19 @@ TEST(Assert, IsNotEvaluatedWhenSwitchedOff) {
   EXPECT_EQ(calls, 0);
 }
 #endif
+
+TEST(Outcome, EachHasItsOwnWordAndRemedy) {
+  std::set<std::string_view> names, messages;
+  for (const OutcomeEntry& entry : outcome_table()) {
+    EXPECT_EQ(to_string(entry.outcome), entry.name);
+    names.insert(entry.name);
+    messages.insert(message(entry.outcome));
+    EXPECT_EQ(remedy(entry.outcome).empty(), entry.outcome == Outcome::converged);
+    EXPECT_NE(describe(entry.outcome).find(remedy(entry.outcome)), std::string::npos);
+  }
+  EXPECT_EQ(names.size(), outcome_table().size());
+  EXPECT_EQ(messages.size(), outcome_table().size());
+}
 
 }  // namespace
 }  // namespace linkwise

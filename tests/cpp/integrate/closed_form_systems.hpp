@@ -14,10 +14,10 @@ namespace linkwise::test {
 struct ForcedOscillator : OdeSystem {
   int size() const override { return 2; }
   int position_size() const override { return 1; }
-  bool evaluate(double t, const double* y, double* ydot) override {
+  Outcome evaluate(double t, const double* y, double* ydot) override {
     ydot[0] = y[1];
     ydot[1] = -y[0] + 3.0 * std::cos(2.0 * t);
-    return true;
+    return Outcome::converged;
   }
   void position_rates(const double*, const double* v, double* qdot) override { qdot[0] = v[0]; }
   void normalise(double*) override {}
@@ -38,7 +38,9 @@ struct FirstOrder : OdeSystem {
   FirstOrder(int n, Rate f) : n_(n), rate(std::move(f)) {}
   int size() const override { return n_; }
   int position_size() const override { return 0; }
-  bool evaluate(double t, const double* y, double* ydot) override { return rate(t, y, ydot); }
+  Outcome evaluate(double t, const double* y, double* ydot) override {
+    return rate(t, y, ydot) ? Outcome::converged : Outcome::not_positive_definite;
+  }
   void position_rates(const double*, const double*, double*) override {}
   void normalise(double*) override {}
   void accepted(double t, const double*) override { accepted_times.push_back(t); }
@@ -53,10 +55,10 @@ struct FirstOrder : OdeSystem {
 struct SpinningBody : OdeSystem {
   int size() const override { return 7; }
   int position_size() const override { return 4; }
-  bool evaluate(double, const double* y, double* ydot) override {
+  Outcome evaluate(double, const double* y, double* ydot) override {
     position_rates(y, y + 4, ydot);
     ydot[4] = ydot[5] = ydot[6] = 0.0;
-    return true;
+    return Outcome::converged;
   }
   void position_rates(const double* q, const double* w, double* qdot) override {
     const double x = q[0], y = q[1], z = q[2], s = q[3];
@@ -75,12 +77,12 @@ struct SpinningBody : OdeSystem {
   }
 };
 
-/// Steps to t_end and returns y there; the status of the last step is in status.
+/// Steps to t_end and returns y there; how the last step ended is in outcome.
 inline std::vector<double> integrate_to(Integrator& integrator, double t_end, int size,
-                                        StepStatus* status = nullptr) {
-  StepStatus last = StepStatus::ok;
-  while (integrator.time() < t_end && last == StepStatus::ok) last = integrator.step(t_end);
-  if (status != nullptr) *status = last;
+                                        Outcome* outcome = nullptr) {
+  Outcome last = Outcome::converged;
+  while (integrator.time() < t_end && last == Outcome::converged) last = integrator.step(t_end);
+  if (outcome != nullptr) *outcome = last;
   std::vector<double> y(static_cast<std::size_t>(size));
   integrator.interpolate(std::min(t_end, integrator.time()), y);
   return y;

@@ -29,7 +29,7 @@ Errors errors_at(IntegratorKind kind, double tolerance) {
   std::vector<double> y(2);
   while (integrator->time() < 10.0) {
     const double before = integrator->time();
-    EXPECT_EQ(integrator->step(10.0), StepStatus::ok);
+    EXPECT_EQ(integrator->step(10.0), Outcome::converged);
     const double t = integrator->time();
     integrator->interpolate(t, y);
     errors.at_steps = std::max(errors.at_steps, ForcedOscillator::error(t, y));
@@ -119,7 +119,7 @@ TEST(Cvode, HonoursMaxStepAndMaxOrder) {
     const auto integrator = make_integrator(kind, system, options);
     integrator->start(0.0, ForcedOscillator::initial());
     while (integrator->time() < 1.0) {
-      ASSERT_EQ(integrator->step(1.0), StepStatus::ok);
+      ASSERT_EQ(integrator->step(1.0), Outcome::converged);
       ASSERT_LE(integrator->statistics().last_step, 0.01 * (1 + 1e-12));
       ASSERT_LE(integrator->statistics().last_order, 2);
     }
@@ -132,7 +132,7 @@ TEST(Cvode, ReachesOrderAboveFiveWithAdams) {
   integrator->start(0.0, ForcedOscillator::initial());
   int highest = 0;
   while (integrator->time() < 10.0) {
-    ASSERT_EQ(integrator->step(10.0), StepStatus::ok);
+    ASSERT_EQ(integrator->step(10.0), Outcome::converged);
     highest = std::max(highest, integrator->statistics().last_order);
   }
   EXPECT_GT(highest, 5);
@@ -168,9 +168,9 @@ TEST(Cvode, StopsAtASingularityOfTheSolution) {
     });
     const auto integrator = make(kind, system, 1e-6);
     integrator->start(0.0, std::vector<double>{1.0});
-    StepStatus status = StepStatus::ok;
-    integrate_to(*integrator, 2.0, 1, &status);
-    EXPECT_TRUE(status == StepStatus::step_too_small || status == StepStatus::not_finite);
+    Outcome outcome = Outcome::converged;
+    integrate_to(*integrator, 2.0, 1, &outcome);
+    EXPECT_TRUE(outcome == Outcome::step_too_small || outcome == Outcome::not_finite);
     EXPECT_NEAR(integrator->time(), 1.0, 1e-3);
   }
 }
@@ -189,11 +189,11 @@ TEST(Cvode, GoesOnAfterEvaluationsThatFailOnlyForLargeSteps) {
 TEST(Cvode, PutsQuaternionsBackThatDriftFar) {
   // A false term stretches the quaternion at rate 1: the history must be restarted, not lost.
   struct Stretching : SpinningBody {
-    bool evaluate(double t, const double* y, double* ydot) override {
+    Outcome evaluate(double t, const double* y, double* ydot) override {
       SpinningBody::evaluate(t, y, ydot);
       for (int i = 0; i < 4; ++i) ydot[i] += y[i];
       longest = std::max(longest, std::hypot(y[2], y[3]));
-      return true;
+      return Outcome::converged;
     }
     double longest = 0.0;
   } system;

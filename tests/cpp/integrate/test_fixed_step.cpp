@@ -26,7 +26,7 @@ double convergence_order(IntegratorKind kind, double s) {
     std::vector<double> y(2);
     while (integrator->time() < 2.0 - 0.5 * step) {
       const double before = integrator->time();
-      EXPECT_EQ(integrator->step(2.0), StepStatus::ok);
+      EXPECT_EQ(integrator->step(2.0), Outcome::converged);
       const double t = before + s * (integrator->time() - before);
       integrator->interpolate(t, y);
       error = std::max(error, ForcedOscillator::error(t, y));
@@ -47,7 +47,7 @@ TEST(RungeKutta4, EvaluatesFourTimesAStep) {
   ForcedOscillator system;
   const auto integrator = make(IntegratorKind::runge_kutta_4, system, 0.1);
   integrator->start(0.0, ForcedOscillator::initial());
-  for (int i = 0; i < 10; ++i) ASSERT_EQ(integrator->step(1.0), StepStatus::ok);
+  for (int i = 0; i < 10; ++i) ASSERT_EQ(integrator->step(1.0), Outcome::converged);
   EXPECT_EQ(integrator->statistics().evaluations, 4 * 10 + 1);
 }
 
@@ -58,7 +58,7 @@ TEST(RungeKutta4, IsExactForPolynomialsOfDegreeFour) {
   });
   const auto integrator = make(IntegratorKind::runge_kutta_4, system, 0.5);
   integrator->start(0.0, std::vector<double>{1.0});
-  for (int i = 0; i < 4; ++i) ASSERT_EQ(integrator->step(2.0), StepStatus::ok);
+  for (int i = 0; i < 4; ++i) ASSERT_EQ(integrator->step(2.0), Outcome::converged);
   std::vector<double> y(1);
   integrator->interpolate(2.0, y);
   EXPECT_DOUBLE_EQ(y[0], 17.0);
@@ -73,10 +73,10 @@ TEST(SemiImplicitEuler, HasOrderOneAtAndBetweenSteps) {
 TEST(SemiImplicitEuler, ConservesTheModifiedEnergyOfAnOscillator) {
   // Of q'' = -q, semi-implicit Euler conserves q^2 + v^2 - h q v exactly [hairer2006, I.2].
   struct Oscillator : ForcedOscillator {
-    bool evaluate(double, const double* y, double* ydot) override {
+    Outcome evaluate(double, const double* y, double* ydot) override {
       ydot[0] = y[1];
       ydot[1] = -y[0];
-      return true;
+      return Outcome::converged;
     }
   } system;
   const double h = 0.1;
@@ -84,7 +84,7 @@ TEST(SemiImplicitEuler, ConservesTheModifiedEnergyOfAnOscillator) {
   integrator->start(0.0, std::vector<double>{1.0, 0.0});
   std::vector<double> y(2);
   for (int i = 0; i < 10000; ++i) {
-    ASSERT_EQ(integrator->step(1e9), StepStatus::ok);
+    ASSERT_EQ(integrator->step(1e9), Outcome::converged);
     integrator->interpolate(integrator->time(), y);
     ASSERT_NEAR(y[0] * y[0] + y[1] * y[1] - h * y[0] * y[1], 1.0, 1e-12);
   }
@@ -95,7 +95,7 @@ TEST(FixedStep, StaysOnTheGridOfTheStart) {
   const auto integrator = make(IntegratorKind::semi_implicit_euler, system, 0.1);
   integrator->start(2.0, ForcedOscillator::initial());
   for (int i = 1; i <= 100000; ++i) {
-    ASSERT_EQ(integrator->step(1e9), StepStatus::ok);
+    ASSERT_EQ(integrator->step(1e9), Outcome::converged);
     ASSERT_EQ(integrator->time(), 2.0 + i * 0.1);
   }
 }
@@ -104,7 +104,7 @@ TEST(FixedStep, RefusesAStepThatRoundOffSwallows) {
   ForcedOscillator system;
   const auto integrator = make(IntegratorKind::runge_kutta_4, system, 1e-9);
   integrator->start(1e9, ForcedOscillator::initial());
-  EXPECT_EQ(integrator->step(2e9), StepStatus::step_too_small);
+  EXPECT_EQ(integrator->step(2e9), Outcome::step_too_small);
 }
 
 }  // namespace

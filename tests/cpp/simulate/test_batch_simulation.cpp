@@ -110,7 +110,7 @@ TEST_P(BatchSimulation, EqualsOneByOne) {
       const auto ends =
           simulate_batch(all, count, members.start(), times, members.samples(), 1, go_on);
       for (size_t i = 0; i < count; ++i) {
-        EXPECT_EQ(ends[i].outcome, "converged");
+        EXPECT_EQ(ends[i].outcome, Outcome::converged);
         EXPECT_EQ(ends[i].time, 0.1);
         Simulation alone(model, options);
         drive(alone, GetParam());
@@ -208,7 +208,7 @@ TEST(BatchSimulation, AMemberThatFailsEndsAlone) {
       simulate_batch(all, members.count, members.start(), times, members.samples(), 2, go_on);
   for (size_t i = 0; i < members.count; ++i) {
     const bool rests = i == at_rest[0] || i == at_rest[1];
-    EXPECT_EQ(ends[i].outcome, rests ? "converged" : "not_finite") << i;
+    EXPECT_EQ(ends[i].outcome, rests ? Outcome::converged : Outcome::not_finite) << i;
     EXPECT_TRUE(rests ? ends[i].time == 1000 : ends[i].time < 100) << ends[i].time;
     EXPECT_TRUE(std::isfinite(members.row(members.load, i, 1)[0]));
     for (const auto* array : {&members.position, &members.load, &members.kinetic})
@@ -233,9 +233,9 @@ TEST(BatchSimulation, AMachineThatCannotMove) {
   const Simulation* const all[] = {&shared};
   const std::vector<double> times = {0, 0.1};
   Members members(*model, native_lanes + 1, times.size());
-  for (const MemberEnd& end :
+  for (const Ending& end :
        simulate_batch(all, members.count, members.start(), times, members.samples(), 1, go_on)) {
-    EXPECT_EQ(end.outcome, "not_positive_definite");
+    EXPECT_EQ(end.outcome, Outcome::not_positive_definite);
     EXPECT_EQ(end.time, 0);
   }
 }
@@ -250,7 +250,7 @@ TEST(BatchSimulation, StopsWhenItIsAskedTo) {
     std::atomic<int> asked{0};
     const auto ends = simulate_batch(all, members.count, members.start(), times, members.samples(),
                                      threads, [&] { return ++asked < 100; });
-    for (const MemberEnd& end : ends) EXPECT_EQ(end.outcome, "interrupted");
+    for (const Ending& end : ends) EXPECT_EQ(end.outcome, Outcome::interrupted);
     EXPECT_TRUE(std::isfinite(members.row(members.position, 3 * native_lanes - 1, 0)[0]));
     EXPECT_TRUE(std::isnan(members.row(members.position, 0, 2)[0]));
   }

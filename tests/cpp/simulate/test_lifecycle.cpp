@@ -86,7 +86,7 @@ TEST(Lifecycle, BatchesOfSimulations) {
     const Simulation* const all[] = {&simulation};
     const auto ends =
         simulate_batch(all, 3, {q.data(), v.data()}, times, sample, 2, [] { return true; });
-    ASSERT_EQ(ends[2].outcome, "converged");
+    ASSERT_EQ(ends[2].outcome, Outcome::converged);
   }
 }
 

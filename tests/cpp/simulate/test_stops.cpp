@@ -22,12 +22,12 @@ TEST(Stops, NotFiniteNamesTheJointAndKeepsWhatCameBefore) {
     const std::vector<double> zero(n);
     simulation.start(0, zero.data(), zero.data());
     EXPECT_EQ(run(simulation, every(0.1, 1)).size(), 3u);  // 0, 0.1, 0.2
-    const Stop& stop = simulation.stop();
+    const Ending& stop = simulation.ending();
     EXPECT_FALSE(stop.ok());
-    EXPECT_EQ(stop.outcome, "not_finite");
+    EXPECT_EQ(stop.outcome, Outcome::not_finite);
     EXPECT_EQ(stop.joint, joint);
     EXPECT_NEAR(stop.time, 0.25, 0.05);
-    EXPECT_FALSE(stop.message.empty());
+    EXPECT_FALSE(stop.text.empty());
     Instant later;
     EXPECT_FALSE(advance(simulation, 2, later));
   };
@@ -68,8 +68,8 @@ TEST(Stops, AStateThatBlowsUpIsNotFinite) {
   simulation.start(0, &q, &v);
   const auto at = run(simulation, every(0.01, 10));
   EXPECT_LT(at.size(), 1000u);
-  EXPECT_EQ(simulation.stop().outcome, "not_finite");
-  EXPECT_EQ(simulation.stop().joint, 0);
+  EXPECT_EQ(simulation.ending().outcome, Outcome::not_finite);
+  EXPECT_EQ(simulation.ending().joint, 0);
   for (const Instant& i : at) EXPECT_TRUE(std::isfinite(i.q[0] + i.v[0]));
 }
 
@@ -82,9 +82,9 @@ TEST(Stops, WhenItIsAskedTo) {
     const double q = 0.5, v = 0;
     simulation.start(0, &q, &v);
     EXPECT_EQ(run(simulation, {0, 1e-3, 1e9}).size(), 2u);
-    EXPECT_EQ(simulation.stop().outcome, "interrupted");
-    EXPECT_GT(simulation.stop().time, 1e-3);
-    EXPECT_LT(simulation.stop().time, 1e3);
+    EXPECT_EQ(simulation.ending().outcome, Outcome::interrupted);
+    EXPECT_GT(simulation.ending().time, 1e-3);
+    EXPECT_LT(simulation.ending().time, 1e3);
   }
 }
 
@@ -96,7 +96,7 @@ TEST(Stops, AStartThatIsNotFinite) {
     simulation.start(0, &q, &v);
     Instant at;
     EXPECT_FALSE(advance(simulation, 1, at));
-    EXPECT_EQ(simulation.stop().outcome, "not_finite");
+    EXPECT_EQ(simulation.ending().outcome, Outcome::not_finite);
   }
 }
 
@@ -107,8 +107,8 @@ TEST(Stops, ABodyThatNothingResistsIsNamed) {
   const double zero = 0;
   simulation.start(0, &zero, &zero);
   EXPECT_EQ(run(simulation, {0, 1}).size(), 0u);
-  EXPECT_EQ(simulation.stop().outcome, "not_positive_definite");
-  EXPECT_EQ(simulation.stop().joint, 0);
+  EXPECT_EQ(simulation.ending().outcome, Outcome::not_positive_definite);
+  EXPECT_EQ(simulation.ending().joint, 0);
 }
 
 std::string error_of(const std::function<void()>& action) {

@@ -21,18 +21,18 @@ void FixedStep::start(double t0, std::span<const double> y0) {
   prepare();
 }
 
-StepStatus FixedStep::step(double /*t_limit*/) {
-  if (max_steps_ > 0 && steps_ >= max_steps_) return StepStatus::too_many_steps;
+Outcome FixedStep::step(double /*t_limit*/) {
+  if (max_steps_ > 0 && steps_ >= max_steps_) return Outcome::too_many_steps;
   const double t_next = start_time_ + static_cast<double>(steps_ + 1) * h_;
-  if (!(t_next > time_)) return StepStatus::step_too_small;
-  const StepStatus status = advance(time_, h_);
-  if (status != StepStatus::ok) return status;
+  if (!(t_next > time_)) return Outcome::step_too_small;
+  const Outcome outcome = advance(time_, h_);
+  if (outcome != Outcome::converged) return outcome;
   previous_.swap(y_);
   y_.swap(next_);
   time_ = t_next;
   ++steps_;
   system_->accepted(time_, y_.data());
-  return StepStatus::ok;
+  return Outcome::converged;
 }
 
 void FixedStep::interpolate(double t, std::span<double> y) {

@@ -15,7 +15,7 @@ class FixedStep : public Integrator {
   FixedStep(OdeSystem& system, const IntegratorOptions& options);
 
   void start(double t0, std::span<const double> y0) final;
-  StepStatus step(double t_limit) final;
+  Outcome step(double t_limit) final;
   void interpolate(double t, std::span<double> y) final;
   double time() const final { return time_; }
   IntegratorStatistics statistics() const final;
@@ -24,8 +24,9 @@ class FixedStep : public Integrator {
   virtual int order() const = 0;
   /// Forgets the previous run; y() holds the initial state.
   virtual void prepare() {}
-  /// Computes next() at t + h from y() at t. After ok it becomes y(), and y() becomes previous().
-  virtual StepStatus advance(double t, double h) = 0;
+  /// Computes next() at t + h from y() at t. After `converged` it becomes y(), and y() becomes
+  /// previous().
+  virtual Outcome advance(double t, double h) = 0;
   /// Writes the interpolant at the fraction s of the last step.
   virtual void interpolate_fraction(double s, std::span<double> y) = 0;
 

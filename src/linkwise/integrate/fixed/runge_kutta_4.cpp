@@ -29,10 +29,10 @@ class RungeKutta4 final : public FixedStep {
     end_rate_known_ = false;
   }
 
-  StepStatus advance(double t, double h) override {
+  Outcome advance(double t, double h) override {
     if (!end_rate_known_) {
-      const StepStatus status = system_.evaluate(t, y().data(), end_rate_.data());
-      if (status != StepStatus::ok) return status;
+      const Outcome outcome = system_.evaluate(t, y().data(), end_rate_.data());
+      if (outcome != Outcome::converged) return outcome;
       end_rate_known_ = true;
     }
     const std::vector<double>& k1 = end_rate_;
@@ -41,19 +41,19 @@ class RungeKutta4 final : public FixedStep {
       for (std::size_t i = 0; i < stage_.size(); ++i) {
         stage_[i] = y()[i] + fraction * h * (*from)[i];
       }
-      const StepStatus status = system_.evaluate(t + fraction * h, stage_.data(), to->data());
-      if (status != StepStatus::ok) return status;
+      const Outcome outcome = system_.evaluate(t + fraction * h, stage_.data(), to->data());
+      if (outcome != Outcome::converged) return outcome;
     }
     for (std::size_t i = 0; i < stage_.size(); ++i) {
       next()[i] = y()[i] + h / 6.0 * (k1[i] + 2.0 * (k2_[i] + k3_[i]) + k4_[i]);
     }
-    if (!all_finite(next())) return StepStatus::not_finite;
+    if (!all_finite(next())) return Outcome::not_finite;
     system_->normalise(next().data());
-    const StepStatus status = system_.evaluate(t + h, next().data(), stage_.data());
-    if (status != StepStatus::ok) return status;
+    const Outcome outcome = system_.evaluate(t + h, next().data(), stage_.data());
+    if (outcome != Outcome::converged) return outcome;
     start_rate_.swap(end_rate_);
     end_rate_.swap(stage_);
-    return StepStatus::ok;
+    return Outcome::converged;
   }
 
   void interpolate_fraction(double s, std::span<double> result) override {

@@ -21,16 +21,16 @@ class SemiImplicitEuler final : public FixedStep {
 
   void prepare() override { rate_.assign(system_.size(), 0.0); }
 
-  StepStatus advance(double t, double h) override {
-    const StepStatus status = system_.evaluate(t, y().data(), rate_.data());
-    if (status != StepStatus::ok) return status;
+  Outcome advance(double t, double h) override {
+    const Outcome outcome = system_.evaluate(t, y().data(), rate_.data());
+    if (outcome != Outcome::converged) return outcome;
     const std::size_t nq = system_.position_size();
     for (std::size_t i = nq; i < rate_.size(); ++i) next()[i] = y()[i] + h * rate_[i];
     system_->position_rates(y().data(), next().data() + nq, rate_.data());
     for (std::size_t i = 0; i < nq; ++i) next()[i] = y()[i] + h * rate_[i];
-    if (!all_finite(next())) return StepStatus::not_finite;
+    if (!all_finite(next())) return Outcome::not_finite;
     system_->normalise(next().data());
-    return StepStatus::ok;
+    return Outcome::converged;
   }
 
   void interpolate_fraction(double s, std::span<double> result) override {

@@ -41,7 +41,7 @@ class Cvode final : public Integrator {
   Cvode(int method, OdeSystem& system, const IntegratorOptions& options);
 
   void start(double t0, std::span<const double> y0) override;
-  StepStatus step(double t_limit) override;
+  Outcome step(double t_limit) override;
   void interpolate(double t, std::span<double> y) override;
   double time() const override { return time_; }
   IntegratorStatistics statistics() const override;
@@ -50,8 +50,8 @@ class Cvode final : public Integrator {
   void attach_solvers(int method);
   void restart();
   void read_counters();
-  StepStatus classify(int flag) const;
-  StepStatus no_smaller_step() const;
+  Outcome classify(int flag) const;
+  Outcome no_smaller_step() const;
   static int right_hand_side(sunrealtype t, N_Vector y, N_Vector ydot, void* self);
 
   double* data(const Vector& vector) const { return N_VGetArrayPointer(vector.get()); }
@@ -71,7 +71,7 @@ class Cvode final : public Integrator {
   double time_ = 0.0;
   bool interpolant_valid_ = false;
   bool restart_needed_ = false;
-  StepStatus failure_ = StepStatus::ok;  ///< of the last evaluation that failed
+  Outcome failure_ = Outcome::converged;  ///< of the last evaluation that failed
   long steps_since_failure_ = 0;
   std::exception_ptr exception_;
   IntegratorStatistics counters_;  ///< since the last restart, as CVODE counts
@@ -128,9 +128,9 @@ int Cvode::right_hand_side(sunrealtype t, N_Vector y, N_Vector ydot, void* self)
   try {
     double* rate = N_VGetArrayPointer(ydot);
     if (cvode.size() == 0) *rate = 0.0;
-    const StepStatus status = cvode.system_.evaluate(t, N_VGetArrayPointer(y), rate);
-    if (status == StepStatus::ok) return 0;
-    cvode.failure_ = status;
+    const Outcome outcome = cvode.system_.evaluate(t, N_VGetArrayPointer(y), rate);
+    if (outcome == Outcome::converged) return 0;
+    cvode.failure_ = outcome;
     cvode.steps_since_failure_ = 0;
     return 1;  // positive: CVODE tries again with a smaller step
   } catch (...) {
@@ -146,7 +146,7 @@ void Cvode::start(double t0, std::span<const double> y0) {
   time_ = t0;
   system_.evaluations = 0;
   counters_ = earlier_ = {};
-  failure_ = StepStatus::ok;
+  failure_ = Outcome::converged;
   restart();
 }
 
@@ -163,9 +163,9 @@ void Cvode::restart() {
   restart_needed_ = false;
 }
 
-StepStatus Cvode::step(double /*t_limit*/) {
+Outcome Cvode::step(double /*t_limit*/) {
   if (options_.max_steps > 0 && earlier_.steps + counters_.steps >= options_.max_steps) {
-    return StepStatus::too_many_steps;
+    return Outcome::too_many_steps;
   }
   if (restart_needed_) restart();
   // CVODE bounds its very first step by a tenth of the distance to this time and ignores it later.
@@ -176,7 +176,7 @@ StepStatus Cvode::step(double /*t_limit*/) {
   if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
   interpolant_valid_ = false;
   if (flag < 0) return classify(flag);
-  if (!all_finite({data(y_), size()})) return StepStatus::not_finite;
+  if (!all_finite({data(y_), size()})) return Outcome::not_finite;
   // CVODE goes on with steps that round-off swallows; nothing would ever end it.
   if (!(t > time_ + 4.0 * std::numeric_limits<double>::epsilon() * std::abs(time_))) {
     return no_smaller_step();
@@ -191,10 +191,10 @@ StepStatus Cvode::step(double /*t_limit*/) {
   interpolant_valid_ = true;
   read_counters();
   system_->accepted(time_, state_.data());
-  return StepStatus::ok;
+  return Outcome::converged;
 }
 
-StepStatus Cvode::classify(int flag) const {
+Outcome Cvode::classify(int flag) const {
   switch (flag) {
     case CV_RHSFUNC_FAIL:
     case CV_FIRST_RHSFUNC_ERR:
@@ -208,16 +208,16 @@ StepStatus Cvode::classify(int flag) const {
       return no_smaller_step();
     default:
       check(flag, "CVode");
-      return StepStatus::step_too_small;
+      return Outcome::step_too_small;
   }
 }
 
 /// Why the steps became too small. Before a time or state that cannot be evaluated, they do so
 /// gradually: CVODE creeps up to it.
-StepStatus Cvode::no_smaller_step() const {
+Outcome Cvode::no_smaller_step() const {
   constexpr long recent = 20;
-  const bool failed = failure_ != StepStatus::ok && steps_since_failure_ <= recent;
-  return failed ? failure_ : StepStatus::step_too_small;
+  const bool failed = failure_ != Outcome::converged && steps_since_failure_ <= recent;
+  return failed ? failure_ : Outcome::step_too_small;
 }
 
 void Cvode::read_counters() {
