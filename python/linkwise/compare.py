@@ -13,14 +13,13 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import InputError
+from linkwise.base import Array
 from linkwise.drives import as_drive, as_wrench
 from linkwise.plot.charts import Dot, DotChart, dots_to_svg
 from linkwise.simulation.arguments import number
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-
-Array = npt.NDArray[np.float64]
 
 REFERENCE = "articulated_body"
 #: The first states of a motion fill the guesses' histories and are not counted.

@@ -23,21 +23,6 @@ JsonOption = Annotated[
 ]
 
 
-def _valid(value: Any) -> Any:
-    """`value` in types that JSON has; infinities and NaN, which it lacks, become null."""
-    if hasattr(value, "tolist"):  # NumPy arrays and scalars
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {str(key): _valid(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_valid(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if value is None or isinstance(value, (bool, int, float, str)):
-        return value
-    return str(value)
-
-
 def say(message: str) -> str:
     """One line on stderr, whatever the message holds; returns it."""
     line = " ".join(message.split())
@@ -46,7 +31,9 @@ def say(message: str) -> str:
 
 
 def print_json(value: Mapping[str, Any]) -> None:
-    print(json.dumps(_valid(value), indent=2, allow_nan=False))
+    from linkwise.base import json_value
+
+    print(json.dumps(json_value(value), indent=2, allow_nan=False))
 
 
 def console(*, stderr: bool = False) -> Console:

@@ -12,12 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
+from linkwise.base import Array
 from linkwise.drives.jumps import LEAST_ROWS, NAMES, find_jump
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-
-Array = npt.NDArray[np.float64]
 Interpolation = Literal["linear", "cubic"]
 Frame = Literal["world", "body"]
 

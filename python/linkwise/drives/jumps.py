@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from linkwise.base import Array
 
 LEAST_ROWS = 8
 _STENCIL = 4

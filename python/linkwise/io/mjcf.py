@@ -14,12 +14,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from linkwise._core import InputError, Model, ModelBuilder
+from linkwise.base import Array
 from linkwise.io.complaint import complain, file_name, shorten
 
-Array = npt.NDArray[np.float64]
 KINDS = ("floating", "spherical", "prismatic", "revolute")
 """Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
 

@@ -14,12 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
+from linkwise.base import Array
 from linkwise.io.mjcf import KINDS, Names, rotation
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-
-Array = npt.NDArray[np.float64]
 
 
 def xyzw_from_wxyz(quaternion: npt.ArrayLike) -> Array:

@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from lxml import etree
 
+from linkwise.base import Array
 from linkwise.io.files import resolve_mesh
 from linkwise.io.numbers import parse_numbers
 from linkwise.io.xml import local_name, parse_xml
 
-Array = npt.NDArray[np.float64]
 Color = tuple[float, float, float, float]
 MESH_SUFFIXES = (".stl", ".dae", ".obj", ".ply", ".glb", ".off")
 MESH_BYTES = 64 << 20

@@ -9,8 +9,8 @@ import numpy as np
 
 from linkwise import _core
 from linkwise._core import InputError
+from linkwise.base import Array
 from linkwise.results.samples import (
-    Array,
     drive_kinds,
     external,
     given_motions,

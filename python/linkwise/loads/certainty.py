@@ -18,10 +18,10 @@ import numpy as np
 
 from linkwise import _core
 from linkwise._core import InputError
+from linkwise.base import Array
 from linkwise.loads.engineering import derive, derived_rows, joint_directions
 from linkwise.loads.peaks import summary
 from linkwise.results.samples import (
-    Array,
     blocks,
     external,
     given_motions,

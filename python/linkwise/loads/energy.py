@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise import _core
-from linkwise.results.samples import Array, external, model_of, need_whole, rows
+from linkwise.base import Array
+from linkwise.results.samples import (
+    external,
+    model_of,
+    need_whole,
+    rows,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

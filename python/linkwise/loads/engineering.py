@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from linkwise.results.samples import Array, Selection, joint_names, model_of, need, rows, select
+from linkwise.base import Array
+from linkwise.results.samples import (
+    Selection,
+    joint_names,
+    model_of,
+    need,
+    rows,
+    select,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

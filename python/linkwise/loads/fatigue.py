@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.base import Array
 from linkwise.loads.engineering import QUANTITIES, derive, drive_power, has_power, joint_directions
 from linkwise.results.samples import (
-    Array,
     joint_names,
     joint_position,
     model_of,

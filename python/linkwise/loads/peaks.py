@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from linkwise.base import Array
 from linkwise.loads.engineering import (
     QUANTITIES,
     derived_rows,
@@ -13,7 +14,6 @@ from linkwise.loads.engineering import (
     joint_directions,
 )
 from linkwise.results.samples import (
-    Array,
     blocks,
     joint_names,
     model_of,

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.base import Array
 from linkwise.io.complaint import near
 from linkwise.loads.engineering import QUANTITIES
-from linkwise.results.samples import Array
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import platform
 import time as clock
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from linkwise import _core
+from linkwise.base import json_value
 from linkwise.paper import chains, guesses, other_codes, spectra, spread, state_choice, table2
 from linkwise.paper.claims import judge_all
 from linkwise.paper.published import INTEGRATOR_TOLERANCE, TOLERANCE_RATIO
@@ -38,19 +38,6 @@ class _Counter:
         if self._progress is not None:
             self._progress(Step(what, self._done, self._total))
         self._done += 1
-
-
-def _plain(value: Any) -> Any:
-    """`value` in types that JSON has: NumPy's become Python's, what is not finite None."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def reproduce(
@@ -86,7 +73,7 @@ def reproduce(
     results["printed_formula"] = spectra.printed_formula(INTEGRATOR_TOLERANCE * TOLERANCE_RATIO)
     results["claims"] = judge_all(results)
     results["run_seconds"] = clock.perf_counter() - started
-    plain: dict[str, Any] = _plain(results)
+    plain: dict[str, Any] = json_value(results)
     return plain
 
 

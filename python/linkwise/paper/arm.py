@@ -11,12 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise import _core
+from linkwise.base import Array
 from linkwise.paper.published import INTEGRATOR_TOLERANCE
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-
-Array = npt.NDArray[np.float64]
 
 DURATION = 10.0
 #: Enough for the slowest scheme, so that none is cut short.

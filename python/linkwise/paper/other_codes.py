@@ -10,9 +10,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from linkwise import _core, scenes
+from linkwise.base import Array
 from linkwise.paper.arm import (
     DURATION,
     MANEUVERS,
@@ -25,8 +25,6 @@ from linkwise.paper.published import TABLE_2
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-
-Array = npt.NDArray[np.float64]
 
 #: Under the rest that J-SI and SOR leave, LSODA changes to its stiff method and takes thousands of
 #: steps.

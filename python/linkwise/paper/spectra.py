@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from linkwise import _core, scenes
+from linkwise.base import Array
 from linkwise.paper.arm import DURATION, MANEUVERS, Maneuver
-
-Array = npt.NDArray[np.float64]
 
 MOST_THREE_TERM = 1000
 _STATES = 21

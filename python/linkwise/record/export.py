@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.base import blocks
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_BLOCK_BYTES = 64 << 20
 # Scalars of one kind share a table.
 _TOGETHER = {
     "energy": ("kinetic_energy", "potential_energy"),
@@ -47,9 +47,7 @@ def _blocks(variables: list[xr.DataArray]) -> Iterator[slice]:
     """Slices of time that keep what is read at once small."""
     count = variables[0].sizes["time"]
     row = sum(v.nbytes // max(1, count) for v in variables)
-    rows = max(1, _BLOCK_BYTES // max(1, row))
-    for start in range(0, count, rows):
-        yield slice(start, min(start + rows, count))
+    return blocks(count, row)
 
 
 def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from linkwise.base import AnyArray
 from linkwise.record.provenance import plain
-from linkwise.record.schema import TIME_ATTRS, Array, Schema
+from linkwise.record.schema import TIME_ATTRS, Schema
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,8 +23,8 @@ class MemoryRecord:
     def __init__(self, schema: Schema, attrs: Mapping[str, Any]) -> None:
         self._schema = schema
         self._attrs = dict(attrs)
-        self._times: list[Array] = []
-        self._chunks: dict[str, list[Array]] = {v.name: [] for v in schema.variables}
+        self._times: list[AnyArray] = []
+        self._chunks: dict[str, list[AnyArray]] = {v.name: [] for v in schema.variables}
 
     def append(self, chunk: Mapping[str, Any]) -> None:
         times = np.array(chunk["time"], dtype=np.float64)

@@ -13,12 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
+from linkwise.base import AnyArray
 from linkwise.record.labels import Scalars, joint_scalars, text_array
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-
-Array = npt.NDArray[Any]
 
 QUANTITIES = (
     "position",
@@ -96,7 +95,7 @@ class Variable:
     def row_bytes(self) -> int:
         return int(np.prod(self.shape, dtype=np.int64)) * self.dtype.itemsize
 
-    def rows(self, chunk: Mapping[str, Any], count: int) -> Array:
+    def rows(self, chunk: Mapping[str, Any], count: int) -> AnyArray:
         """This variable's rows of one chunk returned by `Simulation.advance`."""
         values = np.asarray(chunk[self.name])
         if values.ndim == 0:  # a counter that the core reports once a chunk
@@ -109,7 +108,7 @@ class Variable:
 @dataclass(frozen=True)
 class Coordinate:
     dims: tuple[str, ...]
-    values: Array
+    values: AnyArray
     attrs: Mapping[str, str] = field(default_factory=dict)
 
 

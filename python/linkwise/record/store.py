@@ -19,10 +19,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.base import AnyArray
 from linkwise.record.claim import check_target, hold, release
 from linkwise.record.machine import write_model
 from linkwise.record.provenance import plain
-from linkwise.record.schema import TIME_ATTRS, Array, Coordinate, Schema, Variable
+from linkwise.record.schema import (
+    TIME_ATTRS,
+    Coordinate,
+    Schema,
+    Variable,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -84,7 +90,7 @@ class RunWriter:
         self._rows = block_rows(schema, samples)
         self._flush_seconds = flush_seconds
         self._written = 0
-        self._pending: list[tuple[Array, dict[str, Array]]] = []
+        self._pending: list[tuple[AnyArray, dict[str, AnyArray]]] = []
         self._waiting = 0
         self._flushed = clock.monotonic()
         aside = self.path.with_name(f".{self.path.name}.{secrets.token_hex(4)}.new")
@@ -153,9 +159,9 @@ class RunWriter:
         """Samples that complete the current chunk."""
         return min(self._rows, self._samples) - self._written % self._rows
 
-    def _take(self, count: int) -> tuple[Array, dict[str, Array]]:
+    def _take(self, count: int) -> tuple[AnyArray, dict[str, AnyArray]]:
         """The first `count` waiting samples, joined."""
-        taken: list[tuple[Array, dict[str, Array]]] = []
+        taken: list[tuple[AnyArray, dict[str, AnyArray]]] = []
         missing = count
         while missing:
             times, rows = self._pending.pop(0)

@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from linkwise import base
 from linkwise._core import InputError
+from linkwise.base import Array
 from linkwise.io.complaint import near
 
 if TYPE_CHECKING:
     from linkwise._core import Model
     from linkwise.results.run import Run
-
-Array = npt.NDArray[np.float64]
-# What is held in one go, in bytes: a run may be larger than memory.
-_BLOCK_BYTES = 64 << 20
 
 
 def need(run: Run, *names: str) -> None:
@@ -91,10 +89,7 @@ def need_whole(run: Run, model: Model, *names: str) -> Selection:
 
 def blocks(run: Run, row_bytes: int) -> Iterator[slice]:
     """Slices of time whose rows fit into memory."""
-    count = run.dataset.sizes["time"]
-    rows = max(1, _BLOCK_BYTES // max(1, row_bytes))
-    for start in range(0, count, rows):
-        yield slice(start, min(start + rows, count))
+    return base.blocks(run.dataset.sizes["time"], row_bytes)
 
 
 def rows(run: Run, name: str, where: slice | Sequence[int]) -> Array:

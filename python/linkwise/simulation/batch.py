@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import InputError, Model
+from linkwise.base import Array
 from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from linkwise.drives import Drive, Wrench
 
 QUANTITIES = ("position", "velocity", "acceleration", "joint_load", "drive_torque", "energy")
-Array = npt.NDArray[np.float64]
 
 
 def _machines(model: Model | Sequence[Model]) -> list[Model]:

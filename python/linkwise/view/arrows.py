@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from linkwise.view.shapes import Array, turning_z_to
+from linkwise.base import Array
+from linkwise.view.shapes import turning_z_to
 
 # From small to large; the lightness falls evenly, so that the order survives a grey print.
 _STOPS = np.array(

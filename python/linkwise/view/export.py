@@ -19,11 +19,12 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import InputError
+from linkwise.base import Array
 from linkwise.view import arrows
 from linkwise.view.live import View
 from linkwise.view.panel import legend
 from linkwise.view.server import LOCAL, client_page, replay, running
-from linkwise.view.shapes import Array, quaternions
+from linkwise.view.shapes import quaternions
 from linkwise.view.shown_loads import rating_use
 from linkwise.view.source import Source, static_loads
 

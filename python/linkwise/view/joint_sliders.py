@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from linkwise.base import Array
 from linkwise.record.labels import joint_scalars
-from linkwise.view.shapes import Array
 
 if TYPE_CHECKING:
     import viser

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.view.shapes import Array
+from linkwise.base import Array
 
 if TYPE_CHECKING:
     import viser

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from linkwise.base import Array
 from linkwise.view.arrows import in_world, instances
-from linkwise.view.shapes import Array, quaternions, turning_z_to
+from linkwise.view.shapes import quaternions, turning_z_to
 
 if TYPE_CHECKING:
     from linkwise.view.shown_loads import RatingUse

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise import _core
+from linkwise.base import Array
 from linkwise.io.urdf_visuals import Visual
 from linkwise.view.meshes import load_mesh
 from linkwise.view.placement import (
@@ -24,7 +25,6 @@ from linkwise.view.placement import (
     Spanning,
 )
 from linkwise.view.shapes import (
-    Array,
     Mesh,
     equivalent_boxes,
     turned,

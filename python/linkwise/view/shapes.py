@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from linkwise.base import Array
 
 _THINNEST = 0.02  # of the longest edge: a link without thickness would not be seen
 

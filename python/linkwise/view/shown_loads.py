@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.base import Array, rows_per_block
 from linkwise.loads.causes import CAUSES, Split
 from linkwise.loads.engineering import derive, joint_directions
 from linkwise.loads.rating import rating_table
-from linkwise.view.shapes import Array
 
 if TYPE_CHECKING:
     from linkwise._core import Model
     from linkwise.loads.rating import Rating
     from linkwise.results import Run
 
-_BLOCK_BYTES = 16 << 20
 _MOST_BLOCK = 64  # samples: what a playback passes in a second or two
 _MOST_IN_HISTORY = 200_000  # joint loads that a plot of some causes may take to evaluate
 _HALVES = (("force", "axial", "radial"), ("moment", "tilting_moment", "torque"))
@@ -41,7 +40,7 @@ class CauseLoads:
         self.chosen = set(self.names)
         self._count = run.dataset.sizes["time"]
         size = 48 * model.n_joints * max(1, len(self.names))
-        self._rows = max(1, min(_MOST_BLOCK, _BLOCK_BYTES // size))
+        self._rows = min(_MOST_BLOCK, rows_per_block(size))
         self._most = max(2, _MOST_IN_HISTORY // model.n_joints)
         self._first, self._shares = -1, np.zeros((0, 0, 0, 6))
 

@@ -11,18 +11,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise._core import InputError, Model, inverse_dynamics_loads
+from linkwise.base import Array, rows_per_block
 from linkwise.io.complaint import near
 from linkwise.io.urdf_visuals import Looks, read_looks
 from linkwise.results.samples import rows
 from linkwise.scenario import load_ratings, load_scenario, ratings_in
-from linkwise.view.shapes import Array
 from linkwise.view.shown_loads import CauseLoads
 
 if TYPE_CHECKING:
     from linkwise.loads.rating import Rating
     from linkwise.results import Run
 
-_BLOCK_BYTES = 64 << 20
 PathLike = str | os.PathLike[str]
 
 
@@ -91,7 +90,7 @@ class Recording:
     def _read(self, sample: int) -> int:
         """Row of `sample` in the block at hand, which is replaced when it is not in there."""
         if not self._first <= sample < self._last:
-            count = max(1, _BLOCK_BYTES // max(1, self._row_bytes))
+            count = rows_per_block(self._row_bytes)
             self._first = sample - sample % count
             self._last = min(self._first + count, self.times.size)
             block = slice(self._first, self._last)

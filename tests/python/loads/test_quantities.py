@@ -181,7 +181,7 @@ def test_summary_by_hand(swing):
 
 def test_summary_does_not_depend_on_the_blocks(swing, monkeypatch):
     whole = lw.loads.summary(swing)
-    monkeypatch.setattr("linkwise.results.samples._BLOCK_BYTES", 4096)
+    monkeypatch.setattr("linkwise.base.BLOCK_BYTES", 4096)
     parts = lw.loads.summary(swing)
     for name in whole.data_vars:
         np.testing.assert_allclose(parts[name], whole[name], rtol=1e-13, atol=1e-13)

@@ -10,12 +10,12 @@ import xarray as xr
 
 import linkwise as lw
 from helpers.made_up_run import make_chunk, small_model
+from linkwise import base
 from linkwise.io.table import read_table
 from linkwise.record.memory import MemoryRecord
 from linkwise.record.provenance import provenance
 from linkwise.record.schema import QUANTITIES, build_schema
 from linkwise.record.store import RunWriter
-from linkwise.results import samples
 
 TIMES = np.linspace(0, 2, 21)
 
@@ -78,7 +78,7 @@ def test_model_source_loses_its_folder():
 
 @pytest.mark.parametrize("block", [1, 300, 1 << 20])
 def test_peak_loads(model, monkeypatch, block):
-    monkeypatch.setattr(samples, "_BLOCK_BYTES", block)
+    monkeypatch.setattr(base, "BLOCK_BYTES", block)
     chunk = make_chunk(TIMES)
     load = np.zeros((21, 3, 6))
     load[5, 0, :3] = (3, 0, -4)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import linkwise as lw
+from linkwise import base
 from linkwise.io.urdf_visuals import read_looks
 from linkwise.record.machine import GROUP, read_model
-from linkwise.view import source as source_module
 from linkwise.view.source import Options, open_source, static_loads
 
 URDF = """<robot name="arm">
@@ -76,7 +76,7 @@ def test_bytes_that_are_no_model_are_refused(content):
 
 
 def test_recording_gives_the_samples_of_the_run(run_path, arm, monkeypatch):
-    monkeypatch.setattr(source_module, "_BLOCK_BYTES", 5 * 8 * (arm.nq + 6 * arm.n_joints))
+    monkeypatch.setattr(base, "BLOCK_BYTES", 5 * 8 * (arm.nq + 6 * arm.n_joints))
     run = lw.open_run(run_path)
     recording = open_source(run_path, Options()).recording
     assert np.array_equal(recording.times, run.time.values)

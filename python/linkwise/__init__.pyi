@@ -1,0 +1,56 @@
+"""The public names and where they live, for `__init__.py` and for type checkers."""
+
+from linkwise import drives as drives
+from linkwise import loads as loads
+from linkwise import scenes as scenes
+from linkwise._core import ConstraintSystem as ConstraintSystem
+from linkwise._core import Evaluator as Evaluator
+from linkwise._core import ForwardDynamicsResult as ForwardDynamicsResult
+from linkwise._core import InputError as InputError
+from linkwise._core import Model as Model
+from linkwise._core import ModelBuilder as ModelBuilder
+from linkwise._core import Note as Note
+from linkwise._core import NumericsError as NumericsError
+from linkwise._core import Report as Report
+from linkwise._core import Spectrum as Spectrum
+from linkwise._core import body_jacobian as body_jacobian
+from linkwise._core import body_poses as body_poses
+from linkwise._core import forward_dynamics as forward_dynamics
+from linkwise._core import initial_guesses as initial_guesses
+from linkwise._core import integrators as integrators
+from linkwise._core import inverse_dynamics as inverse_dynamics
+from linkwise._core import inverse_dynamics_loads as inverse_dynamics_loads
+from linkwise._core import joint_loads as joint_loads
+from linkwise._core import joint_loads_by_cause as joint_loads_by_cause
+from linkwise._core import kinetic_energy as kinetic_energy
+from linkwise._core import link_poses as link_poses
+from linkwise._core import mass_matrix as mass_matrix
+from linkwise._core import methods as methods
+from linkwise._core import momentum as momentum
+from linkwise._core import passive_torque as passive_torque
+from linkwise._core import potential_energy as potential_energy
+from linkwise._core import solver_options as solver_options
+from linkwise._core import solvers as solvers
+from linkwise._core import stop_rules as stop_rules
+from linkwise.drives import PD as PD
+from linkwise.drives import Drive as Drive
+from linkwise.drives import Free as Free
+from linkwise.drives import Locked as Locked
+from linkwise.drives import Motion as Motion
+from linkwise.drives import Spring as Spring
+from linkwise.drives import Table as Table
+from linkwise.drives import Torque as Torque
+from linkwise.drives import Wrench as Wrench
+from linkwise.io.load import load as load
+from linkwise.results import Run as Run
+from linkwise.results import open_run as open_run
+from linkwise.scenario import load_scenario as load_scenario
+from linkwise.simulation.batch import simulate_batch as simulate_batch
+from linkwise.simulation.simulate import SimulationError as SimulationError
+from linkwise.simulation.simulate import SimulationInterrupted as SimulationInterrupted
+from linkwise.simulation.simulate import run_scenario as run_scenario
+from linkwise.simulation.simulate import simulate as simulate
+from linkwise.simulation.sweep import sweep as sweep
+from linkwise.simulation.time_loop import Progress as Progress
+
+__version__: str

@@ -1,0 +1,43 @@
+"""What every room uses: the type of arrays, runs cut into blocks, and values as JSON has them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+AnyArray = npt.NDArray[Any]
+
+# What is held of a run at once, in bytes: the run itself may be larger than memory.
+BLOCK_BYTES = 64 << 20
+
+
+def rows_per_block(row_bytes: int) -> int:
+    """How many rows of this size are held at once, at least one."""
+    return max(1, BLOCK_BYTES // max(1, row_bytes))
+
+
+def blocks(count: int, row_bytes: int) -> Iterator[slice]:
+    """Slices of `count` rows, in order, each of which fits into memory."""
+    rows = rows_per_block(row_bytes)
+    for start in range(0, count, rows):
+        yield slice(start, min(start + rows, count))
+
+
+def json_value(value: Any) -> Any:
+    """`value` in types that JSON has; infinities and NaN, which it lacks, become null."""
+    if hasattr(value, "tolist"):  # NumPy arrays and scalars
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): json_value(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [json_value(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return str(value)
