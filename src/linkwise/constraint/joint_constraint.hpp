@@ -120,11 +120,10 @@ inline void complement_of_directions(const Vec3<double>* p, int n, Vec3<double>*
   }
 }
 
-/// Complement and dual where every column is a pure translation or a pure rotation; false where one
-/// is neither. Forces and moments stay apart and the columns vary smoothly with the joint: a
-/// polynomial in time through the last forces, the paper's guess, is of no use where the directions
-/// that they are measured along turn, or mix forces within the plane of a motion with moments out
-/// of it.
+/// Complement and dual if every column is a pure translation or a pure rotation; false otherwise.
+/// Forces and moments stay apart, and the columns vary smoothly with the joint. That matters for
+/// the paper's guess, a polynomial in time through the last forces: it is useless if the directions
+/// of the forces turn, or if forces in the plane of a motion mix with moments out of it.
 inline bool separate_complement(const Motion<double>* P, int n, Vector6<double>* dual,
                                 Vector6<double>* complement) {
   Vec3<double> axes[2][3], duals[2][3], complements[2][3];
@@ -153,9 +152,8 @@ inline bool separate_complement(const Motion<double>* P, int n, Vector6<double>*
   return true;
 }
 
-/// Complement and dual of a single screw, whose translation is along its axis: what
-/// separate_complement() says of forces and moments holds here too, but for the wrench along the
-/// axis that does no work.
+/// Complement and dual of a single screw, whose translation is along its axis. Forces and moments
+/// stay apart as in separate_complement(), except for the wrench along the axis that does no work.
 inline bool screw_complement(const Motion<double>* P, int n, Vector6<double>* dual,
                              Vector6<double>* complement) {
   if (n != 1) return false;

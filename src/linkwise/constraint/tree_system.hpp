@@ -36,8 +36,8 @@ class TreeSystem {
                double* loads);
   /// Accelerations of the bodies that recover() found, the ground's being minus gravity.
   const std::vector<Motion<double>>& accelerations() const { return a_; }
-  /// Largest violation of a constraint by the accelerations that recover() found, over the largest
-  /// acceleration: what rounding and an inexact f have cost.
+  /// Largest violation of a constraint by the accelerations that recover() found, relative to the
+  /// largest acceleration. It shows what rounding and an inexact f have cost.
   double violation() const { return violation_; }
   /// Body of a node of A (they are numbered alike).
   int body_of_node(int node) const { return node; }

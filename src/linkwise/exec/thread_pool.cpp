@@ -27,8 +27,9 @@ int available_cores() {
   return std::max(1u, std::thread::hardware_concurrency());
 }
 
-/// A region is a ticket: its number above, tasks not yet claimed below. Whoever is awake claims the
-/// next task, so a worker that the system does not run holds nobody up.
+/// A region is one number: its index in the upper bits, tasks not yet claimed in the lower bits.
+/// Every thread that is awake claims the next task, so a worker that the system does not run delays
+/// nobody.
 class Pool {
  public:
   static Pool& instance() {

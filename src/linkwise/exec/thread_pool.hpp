@@ -1,13 +1,12 @@
 #pragma once
-// Worker threads that wait between regions. A region's tasks are dealt out by index, so who does
-// what never influences a result: tasks share nothing, and sums over them are made by the caller in
-// order.
+// Worker threads that wait between regions. Tasks of a region share nothing, and the caller makes
+// sums over them in order. So which thread runs which task never influences a result.
 #include <functional>
 
 namespace linkwise {
 
-/// Threads to use where none are asked for: LINKWISE_THREADS, or the cores this process may use.
-/// InputError when the variable is no number in range.
+/// The default number of threads: LINKWISE_THREADS, or the cores that this process may use.
+/// InputError if the variable is not a number in range.
 int default_threads();
 
 /// 0 stands for the default. InputError below 1 or above the limit.

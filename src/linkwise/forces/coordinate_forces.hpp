@@ -8,7 +8,7 @@
 
 namespace linkwise {
 
-/// Are all coordinates of the element angles and distances, one a degree of freedom?
+/// Are all coordinates of the element angles and distances, one per degree of freedom?
 inline bool has_scalar_coordinates(const Element& e) { return e.nq == e.nv; }
 
 /// dq/dt of such an element, [e.nv].
@@ -20,8 +20,8 @@ inline void scalar_rates(const Element& e, const double* q, const double* v, dou
   rate[1] = s * v[e.v] + c * v[e.v + 1];
 }
 
-/// Adds what the forces along its coordinates, [e.nv], do along its rates: the transpose of the
-/// above, so that the power is the same.
+/// Adds to the forces along its rates the share of the forces along its coordinates, [e.nv]. It is
+/// the transpose of the above, so the power is the same.
 inline void add_coordinate_forces(const Element& e, const double* q, const double* force,
                                   double* tau) {
   if (e.kind != ElementKind::planar) {

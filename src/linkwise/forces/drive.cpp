@@ -43,8 +43,8 @@ void evaluate_motion(const JointInfo& joint, const Drive& drive, double t, doubl
   if (drive.motion) {
     drive.motion(t, q, v, a);
   } else {
-    // An integrator may look a little past the last sample: a table that stopped there would make
-    // it see a jump.
+    // An integrator may evaluate a little past the last sample. A table that stopped there would
+    // show it a jump.
     drive.table->evaluate(t, q, 0, true);
     drive.table->evaluate(t, v, 1, true);
     drive.table->evaluate(t, a, 2, true);

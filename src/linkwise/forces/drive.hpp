@@ -18,7 +18,7 @@ inline bool is_prescribed(DriveKind kind) {
 
 struct Drive {
   DriveKind kind = DriveKind::free;
-  std::vector<double> value;  ///< torque, or target of pd; one a degree of freedom
+  std::vector<double> value;  ///< torque, or target of pd; one per degree of freedom
   std::optional<Table> table;
   /// (t, q of the joint, v of the joint, out): torque of the joint.
   std::function<void(double, const double*, const double*, double*)> callable;
@@ -35,7 +35,7 @@ struct Wrench {
   std::function<void(double, double*)> callable;
 };
 
-/// One drive a joint; adds their torques to tau [nv]. A joint whose motion is given gets none.
+/// One drive per joint; adds their torques to tau [nv]. A joint whose motion is given gets none.
 /// pd: kp (target - q) + kd (dtarget/dt - dq/dt) along the coordinates, for joints whose
 /// coordinates are angles and distances.
 void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t,

@@ -5,8 +5,8 @@
 
 namespace linkwise {
 
-/// On [breaks[i], breaks[i+1]): sum_k c[i][k] (t - breaks[i])^(degree - k), per column; beyond the
-/// first and the last break constant, or (extended) the polynomials there go on. Coefficients are
+/// On [breaks[i], breaks[i+1]): sum_k c[i][k] (t - breaks[i])^(degree - k), per column. Beyond the
+/// first and the last break it is constant or, if extended, the polynomials go on. Coefficients are
 /// computed by the caller (a spline library).
 struct Table {
   std::vector<double> breaks;

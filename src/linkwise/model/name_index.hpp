@@ -1,6 +1,6 @@
 #pragma once
-// Which element has a name: a hash table of indices alone, some ten bytes a name, because the names
-// themselves are kept elsewhere already.
+// Which element has a name. It is a hash table of indices alone, some ten bytes per name, because
+// the names themselves are kept elsewhere.
 #include <bit>
 #include <functional>
 #include <string_view>

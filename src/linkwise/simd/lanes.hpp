@@ -67,7 +67,7 @@ template <class S>
 LW_INLINE S larger(const S& a, const S& b) {
   return a > b ? a : b;
 }
-/// The smaller one; not a number where b is none.
+/// The smaller one; NaN if b is NaN.
 template <class S>
 LW_INLINE S smaller(const S& a, const S& b) {
   return a < b ? a : b;

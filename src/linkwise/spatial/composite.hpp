@@ -4,7 +4,8 @@
 
 namespace linkwise {
 
-/// Adds a body's inertia, given in its frame, to that of the body that X leads from.
+/// Adds the inertia of a body, given in its frame, to the inertia of its parent; X takes motion of
+/// the parent to the body.
 inline void add_to_parent(const Transform<double>& X, const Inertia<double>& body,
                           Inertia<double>& parent) {
   ArticulatedInertia<double> Y;

@@ -30,8 +30,9 @@ LW_INLINE void turn(const A& c, const A& s, B& x, B& y) {
   x = turned;
 }
 
-/// Both sides of a 2x2 block turned. Written out: the shorter form that adds c t and s t to the
-/// entries cancels digits of the small one where inertias along and across differ by orders.
+/// A 2x2 block turned from both sides. It is written out because the shorter form, which adds c t
+/// and s t to the entries, cancels digits of the small entry if inertias along and across differ by
+/// orders of magnitude.
 template <class A, class B>
 LW_INLINE void turn_block(const A& c, const A& s, B& xx, B& xy, B& yx, B& yy) {
   turn(c, s, xx, yx);

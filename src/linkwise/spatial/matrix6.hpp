@@ -30,8 +30,8 @@ LW_INLINE Force<S> to_force(const S* v) {
   return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
 }
 
-/// Cholesky factor of Y, packed rows with the reciprocal diagonal. False where in some lane a pivot
-/// is not above this part of its diagonal entry.
+/// Cholesky factor of Y, packed rows with the reciprocal diagonal. False if a pivot of some lane is
+/// not above this part of its diagonal entry.
 template <class S>
 bool factor(const ArticulatedInertia<S>& Y, S* L, double smallest_pivot = 0) {
   const auto entry = [&](int i, int j) -> S {

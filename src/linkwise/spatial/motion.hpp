@@ -35,8 +35,8 @@ LW_INLINE Force<A>& operator-=(Force<A>& a, const Force<B>& b) {
   a.ang -= b.ang;
   return a;
 }
-/// to = f, component by component: where the components were just computed, a copy of the whole may
-/// be made through memory and read in wide words what was written in narrow ones, a stall of a
+/// to = f, component by component. A copy of the whole may go through memory. If the components
+/// were just computed, it would read in wide words what was written in narrow ones: a stall of a
 /// dozen cycles.
 template <class Spatial>
 LW_INLINE void store(Spatial& to, const Spatial& f) {
