@@ -1,7 +1,7 @@
-"""The command line: `linkwise demo`, `inspect`, `run`; one file a command.
+"""The command line: `linkwise demo`, `inspect`, `run`; one file per command.
 
-Imports here and in the command files are kept for when a command runs: `linkwise --help` must not
-wait for NumPy, xarray or the compiled core.
+Imports here and in the command files happen when a command runs: `linkwise --help` must not wait
+for NumPy, xarray or the compiled core.
 """
 
 from linkwise.cli.main import app, main

@@ -132,7 +132,7 @@ def _axes_cell(joint: dict[str, Any]) -> str:
 
 
 def _limits_cell(joint: dict[str, Any]) -> str:
-    """Lower and upper, a pair a degree of freedom; nothing where none is limited."""
+    """Lower and upper, a pair per degree of freedom; nothing where none is limited."""
     pairs = list(zip(joint["lower"], joint["upper"], strict=True))
     if all(abs(low) == float("inf") and abs(high) == float("inf") for low, high in pairs):
         return ""

@@ -20,7 +20,7 @@ _SHOWN = 4
 
 
 def _limited(run: Run, model: Model) -> list[tuple[str, int, float, float]]:
-    """Joint, column of the positions, lower and upper limit, where one is finite without a stop."""
+    """Joint, column, lower and upper limit of joints with a finite limit and no stop."""
     names = run.dataset["joint"].values.tolist() if "joint" in run.dataset else model.joint_names
     sizes = dict(zip(model.joint_names, model.joint_nq, strict=True))
     free = model.limit_stiffness == 0
@@ -35,7 +35,7 @@ def _limited(run: Run, model: Model) -> list[tuple[str, int, float, float]]:
                 if free[dof] and np.isfinite([low[dof], high[dof]]).any()
             ]
         first += sizes[name]
-    # Of joints that the run does not name, nothing is known.
+    # Nothing is known of joints that the run does not name.
     return found if first == run.dataset["position"].shape[1] else []
 
 
@@ -70,7 +70,7 @@ def beyond_limits(run: Run) -> list[dict[str, Any]]:
 
 
 def limit_note(beyond: Sequence[Mapping[str, Any]]) -> str:
-    """What `beyond_limits` found in one sentence, and what to do about it."""
+    """One sentence about what `beyond_limits` found, and what to do about it."""
     said = [
         f"{joint['joint']} ({number(joint['lower'])} .. {number(joint['upper'])}) gets to "
         f"{number(joint['farthest'])}, outside from {number(joint['since'])} s"

@@ -149,7 +149,7 @@ def collect(
 
 
 def peak_records(found: dict[str, Any], joints: list[str] | None) -> list[dict[str, Any]]:
-    """One record a joint and quantity."""
+    """One record per joint and quantity."""
     summary: xr.Dataset = found["summary"]
     components = [str(c) for c in summary["component"].values]
     units = [str(u) for u in summary["quantity_units"].values]

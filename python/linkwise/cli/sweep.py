@@ -30,7 +30,7 @@ def sweep(
         typer.Option("--output", "-o", help="Where to write all runs (a NetCDF file)."),
     ] = None,
     processes: Annotated[
-        int | None, typer.Option(help="How many run side by side; one a processor by default.")
+        int | None, typer.Option(help="How many run side by side; one per processor by default.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

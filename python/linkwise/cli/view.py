@@ -131,7 +131,7 @@ def view(
 
 
 def _report(as_json: bool, facts: dict[str, Any], sentence: str) -> None:
-    """Said at once: whoever reads the address through a pipe waits for it."""
+    """Printed at once, because whoever reads the address through a pipe waits for it."""
     if as_json:
         print_json(facts)
     else:

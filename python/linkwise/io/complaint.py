@@ -1,7 +1,7 @@
 """One-line complaints about bad input: file, line, element, what is wrong, what to do.
 
-Names and numbers in a message come from files that nobody vouches for, so they are shortened and
-stripped of control characters: a complaint stays one line whatever the file holds.
+Names and numbers in a message come from untrusted files. They are shortened and stripped of control
+characters, so a complaint stays one line whatever the file holds.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def shorten(text: object, limit: int = _SHOWN_CHARACTERS) -> str:
 
 
 def file_name(path: str | os.PathLike[str]) -> str:
-    """``path`` as text: names of files may hold bytes that are none."""
+    """``path`` as text; names of files may hold bytes that are not text."""
     return os.fspath(path).encode("utf-8", "replace").decode("utf-8")
 
 

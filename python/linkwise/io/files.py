@@ -77,7 +77,7 @@ def resolve_mesh(
     model_file: str | os.PathLike[str],
     package_dirs: Sequence[str | os.PathLike[str]] = (),
 ) -> Path | None:
-    """The local file that a mesh reference of a URDF means, or None where there is none.
+    """The local file that a mesh reference of a URDF means, or None if it does not exist.
 
     ``package://NAME/REST`` is looked for as NAME/REST below each of ``package_dirs`` (a directory
     that is itself called NAME counts too) and below every directory above the model file;

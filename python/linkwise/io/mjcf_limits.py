@@ -1,4 +1,4 @@
-"""What an MJCF may ask of MuJoCo's compiler, which follows and allocates whatever it is told.
+"""What an MJCF may ask of MuJoCo's compiler, which opens and allocates whatever the file says.
 
 Checked before it sees the file: no other model files, and bounds on everything that a short file
 can make large.
@@ -62,7 +62,7 @@ class _Check:
                         self._check_file(element, str(value))
 
     def _count(self, element: etree._Element) -> float:
-        """Elements below and with this one, replicated ones as often as they will be there."""
+        """Elements from this one down; replicated ones count as often as they will exist."""
         name = local_name(element)
         if name in _OTHER_MODELS and (name == "include" or element.get("file") is not None):
             self._complain(
@@ -75,7 +75,7 @@ class _Check:
         return float(copies) * (1 + below) if name in _COPIES else 1 + below
 
     def _numbers(self, element: etree._Element, key: str) -> float:
-        """The product of the numbers in an attribute; what is no number is MuJoCo's to refuse."""
+        """The product of numbers in an attribute; MuJoCo refuses what is not a number."""
         product = 1.0
         for word in element.get(key, "").split():
             try:

@@ -58,7 +58,7 @@ def read_table(path: str | os.PathLike[str]) -> CsvTable:
 
     The first line that is neither empty nor a comment (``#``) is the header. One column is called
     ``time`` or ``t``; the others are free. A name may carry a unit, as in ``elbow [deg]`` or
-    ``time [ms]``; values are converted to SI. Commas separate, semicolons where the header has no
+    ``time [ms]``; values are converted to SI. Commas separate, or semicolons if the header has no
     comma.
 
     Raises InputError naming file, line and column for gaps (empty cells, short or empty lines),
@@ -70,7 +70,8 @@ def read_table(path: str | os.PathLike[str]) -> CsvTable:
     if not header:
         complain(path, "table", "is empty", "give a header line and at least two rows")
     names, units = _header(path, header_line, header)
-    # Arrays of machine numbers: lists of Python objects would take several times the file's size.
+    # Arrays of machine numbers, because lists of Python objects would take several times the file's
+    # size.
     data = array("d")
     lines = array("q")
     for line, cells in rows:

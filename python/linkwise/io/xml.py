@@ -1,4 +1,4 @@
-"""XML that nobody vouches for: no DTD, no entities, no includes, no network, bounded size."""
+"""XML from an untrusted source: no DTD, no entities, no includes, no network, bounded size."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def parse_xml(path: str | os.PathLike[str]) -> etree._Element:
     data = read_bytes(path, "model file", MODEL_BYTES)
     _refuse_doctype(data, path)
     root = _parse(data, path)
-    # The two parsers might disagree on where the prolog ends; lxml's view decides what is used.
+    # The two parsers might disagree on where the prolog ends; lxml decides.
     if root.getroottree().docinfo.internalDTD is not None:
         _complain_doctype(path, None)
     for element in root.iter(f"{{{_XINCLUDE}}}include"):

@@ -137,7 +137,7 @@ def split(run: Run, by: By = "force", model: Model | None = None) -> xr.DataArra
         by: "force": what each acting force alone would load the joints with while the mechanism
             moves freely under it (joints whose motion is given stay held). "motion": what the
             position, the rates and the accelerations of this very motion each need.
-        model: The machine, where the run does not hold it.
+        model: The machine, if the run does not hold it.
 
     Returns:
         DataArray (time, cause, joint, component), frame and signs as `joint_load`. Causes that the

@@ -134,7 +134,7 @@ def bounds(run: Run, tighter: Run | None = None, model: Model | None = None) -> 
             joints, and `external_wrench` where there are wrenches.
         tighter: The same simulation at a tolerance at least ten times tighter, with the same
             samples; without it the error of the integration is not known.
-        model: The machine, where the run does not hold it.
+        model: The machine, if the run does not hold it.
 
     Returns:
         Dataset over (quantity, joint), in the quantities' units: `algebraic`, `integration` and

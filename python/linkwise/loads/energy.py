@@ -49,7 +49,7 @@ def energy_balance(run: Run, model: Model | None = None) -> xr.Dataset:
     Args:
         run: Holds `position`, `velocity`, `drive_torque`, `energy` of all joints, and
             `external_wrench` where there are wrenches.
-        model: The machine, where the run does not hold it.
+        model: The machine, if the run does not hold it.
 
     Returns:
         Dataset over time [J]: `kinetic_energy`, `potential_energy`, `drive_work`,

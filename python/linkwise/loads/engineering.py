@@ -125,7 +125,7 @@ def quantities(run: Run, model: Model | None = None) -> xr.Dataset:
 
     Args:
         run: Holds `joint_load`; with `velocity` and `drive_torque` also drive power and energy.
-        model: The machine, where the run does not hold it.
+        model: The machine, if the run does not hold it.
 
     Returns:
         Dataset over (time, joint): `force`, `axial`, `radial`, `moment`, `tilting_moment`,

@@ -116,7 +116,7 @@ def damage_equivalent(
     Args:
         run: Holds `joint_load`.
         exponents: Slopes m of the Woehler lines, N ~ S^-m.
-        repetitions: Number N of equal cycles; one a second of the run by default (1 Hz).
+        repetitions: Number N of equal cycles; one per second of the run by default (1 Hz).
         joints: All by default.
 
     Returns:

@@ -70,7 +70,7 @@ def in_frame(
         point: Where moments are taken about, as coordinates (3,) or (joint, 3) [m] in the frame
             `fixed_in`; the joint point by default.
         fixed_in: The frame that the point is fixed in.
-        model: The machine, where the run does not hold it.
+        model: The machine, if the run does not hold it.
 
     Returns:
         DataArray (time, joint, component); `attrs` state frame, point and convention.

@@ -83,7 +83,7 @@ def summary(run: Run, model: Model | None = None) -> xr.Dataset:
 
     Args:
         run: Holds `joint_load`; with `velocity` and `drive_torque` also drive power.
-        model: The machine, where the run does not hold it.
+        model: The machine, if the run does not hold it.
 
     Returns:
         Dataset over (quantity, joint): `peak` (the value of largest magnitude, with its sign),

@@ -31,9 +31,9 @@ STEPS = 64
 # Inner products and norms of an iteration of J-CG with the paper's stop test, each a sum over all
 # bodies: (z, Dz), (z, Az), |f+ - f|, |f+|.
 SUMS_AN_ITERATION = 4
-# How far a point may lie from a fitted power law that it is said to follow.
+# How far a point may lie from the fitted power law and still follow it.
 _FIT_TOLERANCE = 0.15
-# Passes beyond the second end after this many seconds.
+# After the second pass, passes end once this many seconds have gone by.
 _TIME_LIMIT = 3.0
 # A measurement of the serial part adds about so many numbers, a fraction of a millisecond.
 _SERIAL_ADDITIONS, _SERIAL_MEASUREMENTS = 100_000, 9
@@ -90,7 +90,7 @@ def measure(
 
     The states are those of the maneuver itself, at even steps as long as Adams' method takes for
     it on short chains. (Integrated open loop, a long chain is unstable and leaves the maneuver.)
-    Of several passes each state keeps its shortest time: other programs only ever add to it.
+    Of several passes each state keeps its shortest time, because other programs only add to it.
     """
     times = (np.arange(STEPS) + 1) * (DURATION / STEPS)
     q, v, a = maneuver.motion(times)
@@ -160,7 +160,7 @@ def local_exponents(sizes: Sequence[int], values: Sequence[float]) -> list[float
 
 
 def fig2(quick: bool, seed: int, advance: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Time and iterations of a solution for chains of every kind; one record a kind."""
+    """Time and iterations of a solution for chains of every kind; one record per kind."""
     sizes = QUICK_SIZES if quick else FULL_SIZES
     solutions = 4 * STEPS if quick else 1000
     series = []

@@ -50,7 +50,7 @@ def warm_start(advance: Callable[[str], None]) -> list[dict[str, Any]]:
 
 
 def stop_tests(advance: Callable[[str], None]) -> list[dict[str, Any]]:
-    """True error, in the A-norm, over the tolerance that was asked for; by stop rule and guess."""
+    """True error in the A-norm over the tolerance asked for, by stop rule and guess."""
     rows = []
     for solver in STOP_SOLVERS:
         advance(f"stop tests: {solver}")

@@ -49,8 +49,8 @@ far behind on long chains.</p>
 """
 FIG3_NOTE = """
 <p class="note">Eqs. (20) and (21): T_P,i = (T_CPU - T_serial)/N + T_serial, and T_P,r with the
-parallel part times 1.3. T_serial is measured by itself: the sums over all bodies, four an iteration
-(two inner products, two norms of the stop test). With joint coordinates as the state, passing
-velocities outward from body to body is serial too. No time for messages between processors is
-counted.</p>
+parallel part times 1.3. T_serial is measured by itself: the sums over all bodies, four per
+iteration (two inner products, two norms of the stop test). With joint coordinates as the state,
+passing velocities outward from body to body is serial too. No time for messages between processors
+is counted.</p>
 """

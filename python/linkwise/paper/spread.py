@@ -1,8 +1,8 @@
 """How much of a mean number of iterations is chance: the same runs at tolerances close by.
 
-The integrator chooses its steps by an error estimate in which the rest of every solution shows. A
-tolerance changed by a few percent changes nothing that matters, but the steps, and with them how
-often the cubic misses: what remains the same is what a scheme can be held to.
+The integrator chooses its steps by an error estimate, in which the remaining error of every
+solution shows. A tolerance changed by a few percent changes nothing that matters except the steps,
+and with them how often the cubic guess misses. Only what remains the same can be said of a scheme.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ FACTORS = tuple(np.linspace(0.95, 1.05, 11))
 
 
 def spread(advance: Callable[[str], None]) -> list[dict[str, Any]]:
-    """One row a scheme and maneuver, under the paper's protocol."""
+    """One row per scheme and maneuver, under the paper's protocol."""
     model = scenes.srms_3l5d()
     rows = []
     for name in TABLE_2:

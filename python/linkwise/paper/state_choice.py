@@ -16,7 +16,7 @@ _SAMPLES = 101
 
 
 def state_choice(advance: Callable[[str], None]) -> list[dict[str, Any]]:
-    """One row a solver, maneuver and state, under the paper's protocol."""
+    """One row per solver, maneuver and state, under the paper's protocol."""
     advance("choice of the state")
     return [
         _run(maneuver, solver, state)

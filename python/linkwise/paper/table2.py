@@ -46,7 +46,7 @@ def _takes_the_arm(method: str) -> bool:
 
 
 def table2(advance: Callable[[str], None]) -> list[dict[str, Any]]:
-    """One row a method, maneuver and protocol; `advance` is told of each before it starts."""
+    """One row per method, maneuver and protocol; `advance` is called before each of them starts."""
     model = scenes.srms_3l5d()
     kinds = {entry["name"]: entry["kind"] for entry in _core.solvers()}
     rows = []

@@ -27,7 +27,7 @@ def is_run(path: Path) -> bool:
 
 
 def hold(path: Path) -> int | None:
-    """Lock a run's folder for writing; the system drops the lock with the process, however it ends.
+    """Lock a run's folder for writing; the system releases the lock when the process ends.
 
     Returns None where the file system has no locks.
     """

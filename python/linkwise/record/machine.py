@@ -25,7 +25,7 @@ _CHUNK_BYTES = 4 << 20
 
 
 def write_model(store: Path, model: Model) -> None:
-    """Put the description of `model` into the run at `store`; too long a one is left out."""
+    """Put the description of `model` into the run at `store`, unless it is too long."""
     import zarr
 
     if model.n_joints > MOST_BYTES // 100:  # no link takes fewer bytes: spare the work

@@ -26,7 +26,8 @@ def open_dataset(path: Path) -> xr.Dataset:
     import xarray as xr
 
     with warnings.catch_warnings():
-        # A process killed while replacing a file leaves the replacement beside the arrays.
+        # A process that was killed while it replaced a file leaves the replacement beside the
+        # arrays.
         warnings.filterwarnings("ignore", message="Object at .* is not recognized")
         whole: xr.Dataset = xr.open_zarr(
             path, consolidated=False, chunks=None, decode_times=False, mask_and_scale=False

@@ -251,7 +251,7 @@ class ArgumentBuilder:
         joint: str,
         keys: tuple[str, str],
     ) -> list[str]:
-        """The columns meant: those named, or the one called like the joint, or the only one."""
+        """The columns meant: those named, the one with the joint's name, or the only one."""
         if columns is not None:
             return columns
         if column is not None:
@@ -293,7 +293,7 @@ class ArgumentBuilder:
         return drives.Table(table.times, table.values[:, indices], interpolation)  # type: ignore[arg-type]
 
     def _make(self, keys: Sequence[str], kind: type[_D], *values: Any) -> _D:
-        """The drive, with file and key in front of what it complains about."""
+        """The drive; its complaints get the file and the key in front."""
         try:
             return kind(*values)
         except InputError as error:

@@ -313,7 +313,7 @@ _SECTIONS: dict[str, type[Section]] = {
 }
 
 
-# Sections that hold a table a name.
+# Sections that hold one table per name.
 _NAMED: dict[str, type[Section]] = {
     "wrench": WrenchSection,
     "payload": PayloadSection,
