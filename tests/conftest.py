@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, settings
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tools")]
 
-# A shell that starts pytest in the background has it ignore Ctrl-C, which the tests of it need.
+# A shell that starts pytest in the background makes it ignore Ctrl-C, which some tests need.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Deterministic, so that a red run can be repeated; "explore" draws new examples every time.

@@ -54,7 +54,8 @@ def test_undriven_undamped_trees_keep_their_energy(tree):
 @settings(max_examples=20)
 @given(trees(max_joints=5, floating_base=True, gravity=(0, 0, 0)))
 def test_floating_trees_keep_their_momentum(tree):
-    """Dashpots in all inner joints: what joints do to each other, the whole does not feel."""
+    """Dashpots in all inner joints: forces between bodies do not change the momentum of the
+    whole."""
     model = tree.build()
     q0, v0 = start(tree, model)
     dashpots = {name: lw.Torque(lambda t, q, v: -0.1 * v) for name in model.joint_names[1:]}

@@ -40,8 +40,8 @@ struct DynamicsCase {
   }
 };
 
-/// Does the method take the model? Every method takes every model, but for those named here, which
-/// must say so with an InputError.
+/// Does the method take the model? Every method takes every model, except for the pairs named here,
+/// for which it must throw an InputError.
 inline bool takes(const DynamicsEntry& entry, const Model& model) {
   const bool expected = entry.name == "constraint_force" ? model.singular_body() < 0
                         : entry.name == "piecewise"      ? Piecewise::suits(model)

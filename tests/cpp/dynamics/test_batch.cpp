@@ -39,7 +39,7 @@ std::vector<double> row(const std::vector<double>& rows, size_t n, size_t i) {
 
 class Batch : public ::testing::TestWithParam<Machine> {};
 
-// From one system to two full groups and one more, by one evaluator that keeps its scratch.
+// From one system to two full groups and one more, by one evaluator that keeps its workspace.
 TEST_P(Batch, EqualsOneByOne) {
   const Model model(GetParam().spec);
   const size_t nv = model.nv(), n_load = 6 * model.n_joints();

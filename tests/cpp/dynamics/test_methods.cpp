@@ -94,8 +94,8 @@ TEST_P(Methods, InverseDynamicsEqualsTheWorldTwin) {
   expect_close(loads, want.loads, 1e-12, "loads");
 }
 
-// The torques of unit accelerations add up along a chain: what is left of them at its tip is known
-// to fewer digits than in the test above.
+// The torques of unit accelerations add up along a chain, so those at its tip are known to fewer
+// digits than in the test above.
 TEST_P(Methods, ForwardUndoesInverse) {
   const Model model(GetParam().spec);
   const DynamicsCase c(model, 24);
@@ -142,8 +142,8 @@ TEST(MassMatrix, PrescribedRowsAreThoseOfTheIdentity) {
     }
 }
 
-// No recursion depth, and backward stable: the torques of the computed motion are the given ones to
-// what a relative error of 1e-12 in the accelerations costs.
+// No recursion depth, and backward stable: the torques of the computed motion equal the given ones
+// up to what a relative error of 1e-12 in the accelerations costs.
 TEST(LongChain, TorquesOfTheMotionAreThoseGiven) {
   const int n = 50'000;
   Draws draws(3);

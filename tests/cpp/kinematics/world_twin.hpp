@@ -1,8 +1,9 @@
 #pragma once
 // The slow, obvious twin of all sweeps. It works on the links and joints as the user gave them
 // (no merging, no stacking, no aligned axes), in world axes, with Rodrigues' formula and one screw
-// a degree of freedom. Velocities are differentiated by a complex step, so no bias term is derived
-// by hand: forces are rates of momentum. Cost: O(links) a call, O(nv) calls for forward dynamics.
+// per degree of freedom. Velocities are differentiated by a complex step, so no bias term is
+// derived by hand: forces are rates of momentum. Cost: O(links) per call, O(nv) calls for forward
+// dynamics.
 
 #include <complex>
 #include <stdexcept>

@@ -1,6 +1,6 @@
 #pragma once
 // Block trees for tests, made without any mechanism: A = B C B^T with one 6 x 6 SPD compliance C_i
-// a body and, in row i of B, the joint's directions K_i on body i and -H_i on its parent.
+// per body and, in row i of B, the joint's directions K_i on body i and -H_i on its parent.
 
 #include <cstdint>
 #include <random>
@@ -43,7 +43,7 @@ struct RodChain {
 std::string name_of(const RodChain& chain);
 
 /// Chain of uniform rigid rods, length 1, mass 1, radius 0.05, on the ground: the chains of
-/// theory.md section 7.
+/// docs/theory/conjugate_gradients.md.
 BlockTree rod_chain(const RodChain& chain, std::uint64_t seed = 1);
 
 /// Every kind of rod chain at one length.

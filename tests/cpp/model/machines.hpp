@@ -126,7 +126,7 @@ inline std::vector<Machine> axis_geometries(Draws& draws) {
   return all;
 }
 
-/// Two or three massless links in a row between bodies, at most 6 degrees of freedom a stack; a
+/// Two or three massless links in a row between bodies, at most 6 degrees of freedom per stack; a
 /// side branch on the body in the middle.
 inline ModelSpec stacked_spec(Draws& draws) {
   using enum JointType;
@@ -243,8 +243,8 @@ inline std::vector<Machine> all_machines() {
   return all;
 }
 
-/// Joints of one axis in chains, trees and on one body, every second pair with a rotor; screws of
-/// either hand, and one that does not advance.
+/// Joints of one axis in chains, trees and on one body, every second pair with a rotor; left-handed
+/// and right-handed screws, and one that does not advance.
 inline std::vector<Machine> one_axis_machines() {
   using enum JointType;
   std::vector<Machine> all;
