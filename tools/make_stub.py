@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ast
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -25,6 +24,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 TARGETS: tuple[str, ...]
+
 '''
 
 # Parameters that a binding takes as a Python object, by their name.
@@ -149,7 +149,9 @@ def refine(text: str) -> str:
         else:
             continue
         kept.append(statement)
-    return HEADER + "\n" + ast.unparse(ast.Module(kept, [])) + "\n"
+    body = ast.unparse(ast.Module(kept, [])).replace(":\n        ...", ": ...")
+    body = re.sub(r"\n+", "\n", body.replace(":\n    ...", ": ..."))  # one line per function
+    return HEADER + body.replace("\nclass", "\n\nclass") + "\n"
 
 
 def classes(text: str) -> list[ast.ClassDef]:
@@ -169,7 +171,6 @@ def main() -> int:
         print(f"{STUB.name} is not what the core has; run python tools/make_stub.py")
         return 1
     STUB.write_text(text, encoding="utf-8")
-    subprocess.run([sys.executable, "-m", "ruff", "format", "-q", str(STUB)], check=True)
     return 0
 
 

@@ -56,7 +56,7 @@ def _module_name(target: str) -> str:
 
 
 def _choose(asked: str | None) -> str:
-    """The target to import; ImportError with the reason when there is none."""
+    """The target to import; ImportError with the reason when no target fits."""
     built = [t for t in TARGETS if importlib.util.find_spec(_module_name(t)) is not None]
     if not built:
         raise ImportError(

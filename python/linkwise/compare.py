@@ -35,7 +35,7 @@ _TIMING_SECONDS = 0.1
 _SPECTRUM_STATES = 3
 
 
-class Motion(NamedTuple):
+class Trajectory(NamedTuple):
     """Successive states of a motion, a step of the integrator apart."""
 
     times: Array
@@ -77,7 +77,7 @@ def contestants() -> Iterator[Contestant]:
                     yield Contestant(method["name"], solver["name"], guess)
 
 
-def free_motion(model: Model, states: int, seed: int) -> Motion:
+def free_trajectory(model: Model, states: int, seed: int) -> Trajectory:
     """The model let go in a random pose within its limits, at random rates (seeded).
 
     At rest a floating machine would fall without any force in its joints.
@@ -98,7 +98,7 @@ def free_motion(model: Model, states: int, seed: int) -> Motion:
     )
 
 
-def driven_motion(model: Model, arguments: Mapping[str, Any], states: int) -> Motion:
+def driven_trajectory(model: Model, arguments: Mapping[str, Any], states: int) -> Trajectory:
     """The motion of a scenario, as `Scenario.simulate_arguments` describes it, to its middle."""
     simulation = _core.Simulation(
         model,
@@ -149,7 +149,7 @@ def _record(
     states: int,
     description: str,
     most_steps: Callable[[int], int],
-) -> Motion:
+) -> Trajectory:
     """The last accepted steps of a run, with their torques."""
     simulation.keep_trace()
     simulation.start(0.0, q0, v0)
@@ -180,12 +180,12 @@ def _record(
     simulation.start(0.0, q0, v0)
     found = simulation.advance(times, ("position", "velocity", "acceleration", "drive_torque"))
     q, v = found["position"], found["velocity"]
-    return Motion(found["time"], q, v, found["drive_torque"], description)
+    return Trajectory(found["time"], q, v, found["drive_torque"], description)
 
 
 def compare(
     model: Model,
-    motion: Motion,
+    trajectory: Trajectory,
     *,
     tolerance: float = 1e-7,
     stop: str = "energy_norm",
@@ -193,7 +193,7 @@ def compare(
     time_limit: float = 0.5,
     progress: Callable[[Step], object] | None = None,
 ) -> dict[str, Any]:
-    """Measure all contestants along `motion`; rows are sorted, the fastest that converge first.
+    """Measure all contestants along `trajectory`; rows are sorted, the fastest that converge first.
 
     Errors are those of the accelerations in the kinetic-energy norm against the articulated-body
     recursion, the largest along the motion relative to the largest acceleration. A contestant that
@@ -206,7 +206,7 @@ def compare(
         "max_iterations": max_iterations,
     }
     reference = _core.Evaluator(model, method=REFERENCE, **options).follow(
-        motion.times, motion.q, motion.v, motion.tau, passive=True
+        trajectory.times, trajectory.q, trajectory.v, trajectory.tau, passive=True
     )
     expected = reference["acceleration"]
     everyone = list(contestants())
@@ -215,17 +215,17 @@ def compare(
         if progress is not None:
             name = " ".join(filter(None, (contestant.solver, contestant.initial_guess)))
             progress(Step(name or contestant.method, k, len(everyone)))
-        rows.append(_measure(model, motion, contestant, expected, time_limit, options))
+        rows.append(_measure(model, trajectory, contestant, expected, time_limit, options))
     return {
         "model": model.name,
         "bodies": model.n_bodies,
         "degrees_of_freedom": model.nv,
-        "motion": motion.description,
-        "states": int(motion.times.size - WARM_UP),
-        "mean_step": float(np.diff(motion.times).mean()),
+        "motion": trajectory.description,
+        "states": int(trajectory.times.size - WARM_UP),
+        "mean_step": float(np.diff(trajectory.times).mean()),
         "tolerance": tolerance,
         "stop": stop,
-        **_system(model, motion),
+        **_system(model, trajectory),
         "rows": sorted(rows, key=_rank),
     }
 
@@ -238,7 +238,7 @@ def _rank(row: Mapping[str, Any]) -> tuple[int, float, float]:
 
 def _measure(
     model: Model,
-    motion: Motion,
+    trajectory: Trajectory,
     contestant: Contestant,
     expected: Array,
     time_limit: float,
@@ -265,14 +265,14 @@ def _measure(
             **options,
         )
         started = clock.monotonic()
-        found = _pass(evaluator, motion, time_limit)
-        if found["seconds"].size < motion.times.size:  # or was it another program's fault?
-            found = max(found, _pass(evaluator, motion, time_limit), key=_states_reached)
+        found = _pass(evaluator, trajectory, time_limit)
+        if found["seconds"].size < trajectory.times.size:  # or was it another program's fault?
+            found = max(found, _pass(evaluator, trajectory, time_limit), key=_states_reached)
     except InputError as error:
         return {**row, "outcome": "does not apply", "message": str(error)}
     seconds = found["seconds"]
     while clock.monotonic() - started < _TIMING_SECONDS:
-        again = _pass(evaluator, motion, time_limit)["seconds"]
+        again = _pass(evaluator, trajectory, time_limit)["seconds"]
         count = min(seconds.size, again.size)
         seconds = np.minimum(seconds[:count], again[:count])
     row["states"] = max(0, seconds.size - WARM_UP)
@@ -280,14 +280,14 @@ def _measure(
     failed = [outcome for outcome in found["outcome"] if outcome != "converged"]
     if failed:
         row["outcome"] = failed[0]
-    elif seconds.size < motion.times.size:
+    elif seconds.size < trajectory.times.size:
         row["outcome"] = "too slow"
         row["message"] = f"stopped after {time_limit:g} s"
     row["seconds"] = float(seconds[counted].mean())
     if contestant.initial_guess or found["iterations"].any():
         row["mean_iterations"] = float(found["iterations"][counted].mean())
         row["max_iterations"] = int(found["iterations"][counted].max())
-    row["error"] = _error(model, motion, found["acceleration"], expected)
+    row["error"] = _error(model, trajectory, found["acceleration"], expected)
     return row
 
 
@@ -295,17 +295,24 @@ def _states_reached(found: Mapping[str, Any]) -> int:
     return int(found["seconds"].size)
 
 
-def _pass(evaluator: Any, motion: Motion, time_limit: float) -> dict[str, Any]:
+def _pass(evaluator: Any, trajectory: Trajectory, time_limit: float) -> dict[str, Any]:
     evaluator.reset()
     found: dict[str, Any] = evaluator.follow(
-        motion.times, motion.q, motion.v, motion.tau, passive=True, time_limit=time_limit
+        trajectory.times,
+        trajectory.q,
+        trajectory.v,
+        trajectory.tau,
+        passive=True,
+        time_limit=time_limit,
     )
     return found
 
 
-def _error(model: Model, motion: Motion, acceleration: Array, expected: Array) -> float | None:
+def _error(
+    model: Model, trajectory: Trajectory, acceleration: Array, expected: Array
+) -> float | None:
     count = len(acceleration)
-    q = motion.q[:count]
+    q = trajectory.q[:count]
     with np.errstate(all="ignore"):
         off = acceleration - expected[:count]
         if not np.isfinite(off).all():
@@ -316,11 +323,11 @@ def _error(model: Model, motion: Motion, acceleration: Array, expected: Array) -
     return float(np.sqrt(error.max() / size.max())) if size.max() > 0 else float(error.max())
 
 
-def _system(model: Model, motion: Motion) -> dict[str, Any]:
+def _system(model: Model, trajectory: Trajectory) -> dict[str, Any]:
     """The system A f = b: its size, and the worst of its conditioning at some states."""
-    places = np.linspace(0, motion.times.size - 1, _SPECTRUM_STATES).astype(int)
+    places = np.linspace(0, trajectory.times.size - 1, _SPECTRUM_STATES).astype(int)
     try:
-        systems = [_core.ConstraintSystem(model, motion.q[k]) for k in places]
+        systems = [_core.ConstraintSystem(model, trajectory.q[k]) for k in places]
     except InputError as error:
         return {
             "unknowns": None,

@@ -12,7 +12,7 @@ from linkwise.cli.progress import live_steps
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-    from linkwise.compare import Motion
+    from linkwise.compare import Trajectory
 
 
 def compare(
@@ -55,10 +55,10 @@ def compare(
 
     if plot is not None and plot.suffix.lower() != ".svg":
         raise typer.BadParameter(f"{plot}: charts are written as SVG; name a file in .svg")
-    loaded, motion = _motion(model, states, seed, floating_base, package_dir or [])
+    loaded, trajectory = _trajectory(model, states, seed, floating_base, package_dir or [])
     with live_steps(quiet=as_json) as progress:
         found = run_comparison(
-            loaded, motion, tolerance=tolerance, stop=stop, time_limit=limit, progress=progress
+            loaded, trajectory, tolerance=tolerance, stop=stop, time_limit=limit, progress=progress
         )
     if plot is not None:
         plot.write_text(draw(found) + "\n", encoding="utf-8")
@@ -69,10 +69,10 @@ def compare(
         _show(found)
 
 
-def _motion(
+def _trajectory(
     path: Path, states: int, seed: int, floating_base: bool, package_dirs: list[Path]
-) -> tuple[Model, Motion]:
-    from linkwise.compare import driven_motion, free_motion
+) -> tuple[Model, Trajectory]:
+    from linkwise.compare import driven_trajectory, free_trajectory
     from linkwise.io.load import load
     from linkwise.scenario import load_scenario
 
@@ -80,12 +80,12 @@ def _motion(
         model = load(
             path, floating_base=floating_base, package_dirs=package_dirs, mimic="independent"
         )
-        return model, free_motion(model, states, seed)
+        return model, free_trajectory(model, states, seed)
     if floating_base or package_dirs:
         raise typer.BadParameter("a scenario says itself how its model is loaded; edit it")
     scenario = load_scenario(path)
     model = scenario.load_model()
-    return model, driven_motion(model, scenario.simulate_arguments(model), states)
+    return model, driven_trajectory(model, scenario.simulate_arguments(model), states)
 
 
 def _show(found: dict[str, Any]) -> None:

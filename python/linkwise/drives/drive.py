@@ -250,7 +250,7 @@ class Spring(Drive):
 class Motion(Drive):
     """The joint follows a given motion exactly; its load holds the drive torque that this takes.
 
-    value: a cubic Table of positions [rad, m], one column a degree of freedom, that covers the
+    value: a cubic Table of positions [rad, m], one column per degree of freedom, that covers the
         whole simulation; or a function ``value(t)`` that returns position, velocity and
         acceleration. The joint starts on the motion, whatever the initial state says.
 

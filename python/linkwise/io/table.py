@@ -185,7 +185,7 @@ def _numbers(
             path,
             "row",
             f"has {len(cells)} cells where the header has {len(names)}",
-            "give every row one number a column",
+            "give every row one number per column",
             line,
         )
     row = []

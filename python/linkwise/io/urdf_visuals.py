@@ -1,7 +1,7 @@
 """What a URDF says its links look like: boxes, cylinders, spheres and meshes that lie on this disk.
 
-Looks never stop anybody: a visual that cannot be read, or a mesh that is not here, is counted and
-left out. Nothing is fetched.
+Appearance never stops anybody: a visual that cannot be read, or a mesh that is not here, is
+counted and left out. Nothing is fetched.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Visual:
 
 
 @dataclass(frozen=True)
-class Looks:
+class Appearance:
     """The visuals of a file, the names of its links, and the mesh references not found here."""
 
     visuals: list[Visual]
@@ -51,17 +51,17 @@ class Looks:
     missing: list[str]
 
 
-def read_looks(
+def read_appearance(
     path: str | os.PathLike[str], package_dirs: Sequence[str | os.PathLike[str]] = ()
-) -> Looks:
+) -> Appearance:
     """The visuals of a URDF; none of a file that is something else.
 
     Raises InputError where :func:`linkwise.io.xml.parse_xml` does.
     """
     root = parse_xml(path)
-    looks = Looks([], [], [])
+    appearance = Appearance([], [], [])
     if local_name(root) != "robot":
-        return looks
+        return appearance
     named = {
         element.get("name", ""): color
         for element in root.iterchildren(tag=etree.Element)
@@ -71,17 +71,17 @@ def read_looks(
         if local_name(link) != "link":
             continue
         name = link.get("name", "")
-        looks.links.append(name)
+        appearance.links.append(name)
         for element in link.iterchildren(tag=etree.Element):
             if local_name(element) != "visual":
                 continue
             try:
-                found = _visual(name, element, named, path, package_dirs, looks.missing)
+                found = _visual(name, element, named, path, package_dirs, appearance.missing)
             except ValueError:
                 continue
             if found is not None:
-                looks.visuals.append(found)
-    return looks
+                appearance.visuals.append(found)
+    return appearance
 
 
 def _child(element: etree._Element, name: str) -> etree._Element | None:

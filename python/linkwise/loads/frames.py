@@ -90,7 +90,7 @@ def in_frame(
         if given.shape not in ((3,), (machine.n_joints, 3)) or not np.isfinite(given).all():
             raise InputError(
                 f"point: shape {given.shape}; give three finite coordinates in metres, or one row "
-                f"a joint ({machine.n_joints}, 3)"
+                f"per joint ({machine.n_joints}, 3)"
             )
         pose = {"child": child, "parent": parent}.get(fixed_in, np.eye(4))
         at = pose[..., :3, 3] + np.einsum(

@@ -1,7 +1,7 @@
 """Names and units of joint coordinates and joint velocities, as results are labelled with.
 
-A joint with one degree of freedom lends its own name; a joint with more adds a suffix a
-coordinate, so that a floating base `base` has the positions `base.x` ... `base.qw` and the
+A joint with one degree of freedom lends its own name; a joint with more adds a suffix
+per coordinate, so that a floating base `base` has the positions `base.x` ... `base.qw` and the
 velocities `base.vx` ... `base.wz`. The order is the one of the compiled core.
 """
 
@@ -64,7 +64,7 @@ _SCALARS: dict[str, tuple[tuple[_Scalar, ...], tuple[_Scalar, ...]]] = {
 
 @dataclass(frozen=True)
 class Scalars:
-    """A row a scalar: its label, its unit and its index in the model's q or v."""
+    """One row per scalar: its label, its unit and its index in the model's q or v."""
 
     labels: npt.NDArray[np.str_]
     units: npt.NDArray[np.str_]
@@ -72,7 +72,7 @@ class Scalars:
 
 
 def text_array(texts: Iterable[str]) -> npt.NDArray[np.str_]:
-    """Fixed-width text: NumPy object arrays cost a Python object an element."""
+    """Fixed-width text: NumPy object arrays cost a Python object per element."""
     listed = list(texts)
     return np.array(listed, dtype=np.str_) if listed else np.zeros(0, dtype="<U1")
 

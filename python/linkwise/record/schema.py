@@ -98,7 +98,7 @@ class Variable:
     def rows(self, chunk: Mapping[str, Any], count: int) -> AnyArray:
         """This variable's rows of one chunk returned by `Simulation.advance`."""
         values = np.asarray(chunk[self.name])
-        if values.ndim == 0:  # a counter that the core reports once a chunk
+        if values.ndim == 0:  # a counter that the core reports once per chunk
             values = np.full(count, values)
         if self.take is not None:
             values = values[:, self.take]
@@ -160,7 +160,7 @@ def resolve_joints(model: Model, joints: Sequence[str] | None) -> list[int]:
 def _scalar_variable(
     name: str, dim: str, scalars: Scalars, whole: int, coordinates: dict[str, Coordinate]
 ) -> Variable:
-    """A variable with one column a joint coordinate or velocity, and its units."""
+    """A variable with one column per joint coordinate or velocity, and its units."""
     attrs = dict(_SCALAR_ATTRS[name])
     if name == "drive_torque":
         units = text_array(

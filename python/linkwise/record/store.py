@@ -54,7 +54,7 @@ def chunk_shape(variable: Variable, rows: int) -> tuple[int, ...]:
     """Chunks hold one block in time and are cut along joints when they get large.
 
     Scalars get longer chunks, rewritten with every block: a large system has blocks of few samples,
-    and as many files a scalar would take long to open.
+    and as many files per scalar would take long to open.
     """
     if not variable.shape:
         return (max(rows, SCALAR_ROWS),)

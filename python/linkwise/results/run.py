@@ -137,10 +137,10 @@ class Run:
         return write_netcdf(self.dataset, path)
 
     def to_csv(self, path: str | os.PathLike[str], quantity: str | None = None) -> list[Path]:
-        """Write tables with a row a sample and a column a scalar, the first one `time [s]`.
+        """Write tables with a row per sample and a column per scalar, the first one `time [s]`.
 
         Args:
-            path: A folder, which gets one file a quantity, or a `.csv` file for one quantity.
+            path: A folder, which gets one file per quantity, or a `.csv` file for one quantity.
             quantity: Which one, when `path` is a file: a variable's name, "energy" or "statistics".
 
         Returns:

@@ -184,8 +184,8 @@ def simulate(
         model: The mechanism.
         duration: Seconds to simulate; may be left out when `times` are given.
         drives: Per joint name a drive (`Torque`, `PD`, `Locked`, `Free`), or what makes a `Torque`:
-            a number, one number a degree of freedom, or a callable `f(t, q, v)` of the joint's own
-            coordinates and velocities. Joints without a drive move freely.
+            a number, one number per degree of freedom, or a callable `f(t, q, v)` of the joint's
+            own coordinates and velocities. Joints without a drive move freely.
         wrenches: Per body name an external `Wrench`.
         q0: Initial coordinates, shape (nq,); the neutral configuration by default.
         v0: Initial velocities, shape (nv,); zero by default.

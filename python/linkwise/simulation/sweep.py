@@ -54,7 +54,7 @@ def sweep(
         scenario: The scenario file, or what `load_scenario` returned.
         axes: Values by dotted key: `{"payload.box.mass": [0, 5, 10], "drive.elbow.table":
             ["slow.csv", "fast.csv"]}`.
-        processes: How many run side by side; one a processor by default. Results do not depend on
+        processes: How many run side by side; one per processor by default. Results do not depend on
             it.
         progress: Called with the number of members done and of all.
 

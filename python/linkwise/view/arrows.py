@@ -78,7 +78,7 @@ def in_world(frames: Array, loads: Array) -> tuple[Array, Array]:
 def instances(
     points: Array, vectors: Array, largest: float, longest: float, use: Array | None = None
 ) -> Instances:
-    """An instance a vector: `largest` gets the length `longest` [m], others their share.
+    """One instance per vector: `largest` gets the length `longest` [m], others their share.
 
     The colour is that of the share, or of `use`, the shares of a rating.
     """

@@ -47,7 +47,7 @@ class Exported(NamedTuple):
     bytes: int
 
 
-class Motion(NamedTuple):
+class Animation(NamedTuple):
     """What moves, over the frames of the film.
 
     poses: (frames, n, 7: position, quaternion with its scalar first) of the joint frames, then of
@@ -120,11 +120,11 @@ def write_html(
     machine at rest. by_rating: colours show how much of the ratings loads use from the start.
     """
     file = check_file(path)
-    motion = _still(source) if source.recording is None else _film(source)
+    animation = _still(source) if source.recording is None else _film(source)
     with running(LOCAL, 0, source.title) as server:
         view = View(server, source, by_rating=by_rating, posable=False)
         view.step(0.0)
-        content = _content(source, view.scene, motion)
+        content = _content(source, view.scene, animation)
         content["byRating"] = by_rating
         blob = Blob()
         content["messages"] = replay(server, blob.parts)
@@ -135,8 +135,8 @@ def write_html(
         raise InputError(
             f"export {str(path)!r}: cannot be written ({error.strerror}); choose another path"
         ) from None
-    duration = float(motion.times[-1] - motion.times[0])
-    return Exported(file, motion.times.size, duration, file.stat().st_size)
+    duration = float(animation.times[-1] - animation.times[0])
+    return Exported(file, animation.times.size, duration, file.stat().st_size)
 
 
 def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
@@ -162,15 +162,15 @@ def _poses(model: Model, q: Array, link_poses: npt.NDArray[np.int64]) -> Array:
     return np.concatenate([frames[:, :3, 3], quaternions(frames[:, :3, :3])], axis=1)
 
 
-def _still(source: Source) -> Motion:
+def _still(source: Source) -> Animation:
     model = source.model
     q = model.neutral_configuration()
     where = _link_poses(model, q)
     poses, loads = _poses(model, q, where)[None], static_loads(model, q)[None, None]
-    return Motion(np.zeros(1), poses.astype(np.float32), where, loads.astype(np.float32), [])
+    return Animation(np.zeros(1), poses.astype(np.float32), where, loads.astype(np.float32), [])
 
 
-def _film(source: Source) -> Motion:
+def _film(source: Source) -> Animation:
     recording, model = source.recording, source.model
     assert recording is not None
     causes = recording.causes.names if recording.causes is not None else []
@@ -187,10 +187,10 @@ def _film(source: Source) -> Motion:
     if causes:
         assert recording.causes is not None
         loads[:] = recording.causes.shares(chosen)
-    return Motion(recording.times[chosen], poses, where, loads, causes)
+    return Animation(recording.times[chosen], poses, where, loads, causes)
 
 
-def _content(source: Source, scene: Scene, motion: Motion) -> dict[str, Any]:
+def _content(source: Source, scene: Scene, animation: Animation) -> dict[str, Any]:
     """Everything that player.js needs but the messages."""
     recording = source.recording
     largest = scene.style.largest
@@ -201,20 +201,20 @@ def _content(source: Source, scene: Scene, motion: Motion) -> dict[str, Any]:
     ]
     for layer in layers:
         if "links" in layer:
-            layer["links"] = motion.link_poses[layer["links"]]
+            layer["links"] = animation.link_poses[layer["links"]]
     names = source.model.joint_names
     use = rating_use(source.model, source.ratings, needed=False)
     rating = None
     if use is not None:
         rating = {"directions": np.nan_to_num(use.directions, nan=np.inf), "limits": use.limits}
-    chosen = motion.causes
+    chosen = animation.causes
     if recording is not None and recording.causes is not None:
         chosen = sorted(recording.causes.chosen)
     return {
-        "times": [float(t) for t in motion.times],
-        "poses": motion.poses,
-        "loads": motion.loads,
-        "causes": motion.causes,
+        "times": [float(t) for t in animation.times],
+        "poses": animation.poses,
+        "loads": animation.loads,
+        "causes": animation.causes,
         "chosen": chosen,
         "jointNames": names,
         "toggles": scene.toggles,

@@ -14,19 +14,19 @@ if TYPE_CHECKING:
     import viser
 
     from linkwise._core import Model
-    from linkwise.view.panel import Wishes
+    from linkwise.view.panel import Requests
 
 MOST_SLIDERS = 60
 
 
 class JointSliders:
-    """A slider a coordinate, between its limits; of long models those of the first joints.
+    """One slider per coordinate, between its limits; of long models those of the first joints.
 
     The four coordinates of a quaternion are set by three angles, about x, then y, then z.
     """
 
     def __init__(
-        self, server: viser.ViserServer, model: Model, size: float, wishes: Wishes
+        self, server: viser.ViserServer, model: Model, size: float, requests: Requests
     ) -> None:
         self._model = model
         self.q = model.neutral_configuration()
@@ -34,9 +34,9 @@ class JointSliders:
         self._resets: list[float] = []
         joints = self._shown_joints()
         with server.gui.add_folder("Joints"):
-            server.gui.add_button("Zero").on_click(lambda event: self._reset(wishes))
+            server.gui.add_button("Zero").on_click(lambda event: self._reset(requests))
             for joint in joints:
-                self._add_joint(server, joint, size, wishes)
+                self._add_joint(server, joint, size, requests)
             if len(joints) < model.n_joints:
                 server.gui.add_markdown(f"{model.n_joints - len(joints)} more joints stay at zero.")
 
@@ -50,7 +50,7 @@ class JointSliders:
         return shown
 
     def _add_joint(
-        self, server: viser.ViserServer, joint: int, size: float, wishes: Wishes
+        self, server: viser.ViserServer, joint: int, size: float, requests: Requests
     ) -> None:
         """Rows of one joint: label, first coordinate, limits, and how it is set."""
         model = self._model
@@ -67,7 +67,7 @@ class JointSliders:
             def move(value: float, at: int = at) -> None:
                 self.q[at] = value
 
-            self._add(server, label, low, high, wishes, move, self.q[at])
+            self._add(server, label, low, high, requests, move, self.q[at])
         if turning:
             angles = np.zeros(3)
             name = model.joint_names[joint]
@@ -78,10 +78,19 @@ class JointSliders:
                     angles[axis] = value
                     self.q[where] = quaternion_of(angles)
 
-                self._add(server, f"{name}.{'xyz'[axis]} [rad]", -math.pi, math.pi, wishes, turn, 0)
+                self._add(
+                    server, f"{name}.{'xyz'[axis]} [rad]", -math.pi, math.pi, requests, turn, 0
+                )
 
     def _add(
-        self, server: Any, label: str, low: float, high: float, wishes: Wishes, act: Any, start: Any
+        self,
+        server: Any,
+        label: str,
+        low: float,
+        high: float,
+        requests: Requests,
+        act: Any,
+        start: Any,
     ) -> None:
         value = float(np.clip(start, low, high))
         act(value)
@@ -91,16 +100,16 @@ class JointSliders:
 
         def move(event: Any) -> None:
             act(slider.value)
-            wishes.redraw = True
+            requests.redraw = True
 
         slider.on_update(move)
         self._sliders.append(slider)
         self._resets.append(value)
 
-    def _reset(self, wishes: Wishes) -> None:
+    def _reset(self, requests: Requests) -> None:
         for slider, value in zip(self._sliders, self._resets, strict=True):
             slider.value = value  # its callback sets the coordinate
-        wishes.redraw = True
+        requests.redraw = True
 
 
 def _in_quaternion(label: Any, scalars: Any) -> bool:

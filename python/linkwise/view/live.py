@@ -1,4 +1,4 @@
-"""The view in the browser: one thread that moves time, acts on wishes and draws."""
+"""The view in the browser: one thread that moves time, acts on requests and draws."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from linkwise.view.load_plot import LoadPlot
 from linkwise.view.panel import (
     JointChoice,
     PlaybackControls,
-    Wishes,
+    Requests,
     add_load_choices,
     add_show_folder,
     headline,
@@ -49,7 +49,7 @@ class View:
         posable: bool = True,
     ) -> None:
         self._source = source
-        self._wishes = Wishes(redraw=True)
+        self._requests = Requests(redraw=True)
         self._joint = 0
         self._sample = -1
         self._told = self._drawn = 0.0
@@ -65,13 +65,15 @@ class View:
         if recording is not None:
             self.scene.style.largest = recording.largest
             self._playback = Playback(float(recording.times[0]), float(recording.times[-1]))
-            self._controls = PlaybackControls(server, self._playback, self._wishes)
+            self._controls = PlaybackControls(server, self._playback, self._requests)
         self._sliders: JointSliders | None = None
         if recording is None and posable:
-            self._sliders = JointSliders(server, source.model, 0.5 * self.scene.size, self._wishes)
+            self._sliders = JointSliders(
+                server, source.model, 0.5 * self.scene.size, self._requests
+            )
         if recording is None or recording.has_loads:
             self._add_loads(server, recording, by_rating)
-        add_show_folder(server, self.scene, self._wishes)
+        add_show_folder(server, self.scene, self._requests)
 
     def _add_loads(
         self, server: viser.ViserServer, recording: Recording | None, by_rating: bool
@@ -79,7 +81,7 @@ class View:
         with server.gui.add_folder("Joint load"):
             self._legend = server.gui.add_html(legend(self._largest, by_rating))
             names = self._source.model.joint_names
-            self._choice = JointChoice(server, self.scene, names, self._wishes)
+            self._choice = JointChoice(server, self.scene, names, self._requests)
             if recording is not None:
                 self._plot = LoadPlot(server, recording)
                 self._plot.choose(0)
@@ -89,42 +91,42 @@ class View:
                 causes.names if causes else [],
                 causes.chosen if causes else set(),
                 None if self._use is None else by_rating,
-                self._wishes,
+                self._requests,
             )
 
     def step(self, seconds: float) -> None:
         """Let wall time pass and draw what changed."""
-        wishes, self._wishes.redraw = self._wishes.redraw, False
-        while self._wishes.toggles:
-            self.scene.toggle(*self._wishes.toggles.popitem())
-        wishes = self._take_load_choices() or wishes
-        if self._wishes.joint is not None:
-            self._joint = self._source.model.joint_index(self._wishes.joint)
-            self._wishes.joint = None
+        requests, self._requests.redraw = self._requests.redraw, False
+        while self._requests.toggles:
+            self.scene.toggle(*self._requests.toggles.popitem())
+        requests = self._take_load_choices() or requests
+        if self._requests.joint is not None:
+            self._joint = self._source.model.joint_index(self._requests.joint)
+            self._requests.joint = None
             if self._plot is not None:
                 self._plot.choose(self._joint)
-            wishes = True
+            requests = True
         if self._source.recording is None:
-            if wishes:
+            if requests:
                 self._draw_pose()
         else:
-            self._draw_sample(self._source.recording, seconds, wishes)
+            self._draw_sample(self._source.recording, seconds, requests)
 
     def _take_load_choices(self) -> bool:
         """Which causes are shown and what colours mean; whether anything has changed."""
         changed = False
         recording = self._source.recording
-        if self._wishes.causes and recording is not None and recording.causes is not None:
+        if self._requests.causes and recording is not None and recording.causes is not None:
             causes, changed = recording.causes, True
             chosen = set(causes.chosen)
-            while self._wishes.causes:
-                name, shown = self._wishes.causes.popitem()
+            while self._requests.causes:
+                name, shown = self._requests.causes.popitem()
                 chosen = chosen | {name} if shown else chosen - {name}
             causes.choose(sorted(chosen))
             if self._plot is not None:
                 self._plot.choose(self._joint)
-        if self._wishes.by_rating is not None:
-            by_rating, self._wishes.by_rating = self._wishes.by_rating, None
+        if self._requests.by_rating is not None:
+            by_rating, self._requests.by_rating = self._requests.by_rating, None
             self.scene.style.use = self._use if by_rating else None
             self._legend.content = legend(self._largest, by_rating)
             changed = True

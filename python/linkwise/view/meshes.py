@@ -19,7 +19,7 @@ def load_mesh(
 ) -> trimesh.Trimesh | None:
     """The mesh of a local file as one piece, in its own colours, or in `color` if it has none.
 
-    None when the file cannot be read: looks never stop anybody.
+    None when the file cannot be read: appearance never stops anybody.
     """
     import trimesh
 

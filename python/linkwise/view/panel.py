@@ -21,7 +21,7 @@ MOST_CHOICES = 300  # joints in a drop-down list; of more, one is named or click
 
 
 @dataclass
-class Wishes:
+class Requests:
     """What users asked for and is not yet done."""
 
     toggles: dict[str, bool] = field(default_factory=dict)
@@ -50,14 +50,14 @@ def add_load_choices(
     causes: Sequence[str],
     chosen: set[str],
     rated: bool | None,
-    wishes: Wishes,
+    requests: Requests,
 ) -> None:
     """Checkboxes of causes, and of the colours' meaning where there are ratings (None: none)."""
     if rated is not None:
         rating = server.gui.add_checkbox("Colour by rating", rated)
 
         def recolor(event: Any) -> None:
-            wishes.by_rating = rating.value
+            requests.by_rating = rating.value
 
         rating.on_update(recolor)
     if len(causes) < 2:
@@ -67,19 +67,19 @@ def add_load_choices(
             box = server.gui.add_checkbox(name, name in chosen)
 
             def note(event: Any, name: str = name, box: Any = box) -> None:
-                wishes.causes[name] = box.value
+                requests.causes[name] = box.value
 
             box.on_update(note)
 
 
-def add_show_folder(server: viser.ViserServer, scene: Scene, wishes: Wishes) -> None:
+def add_show_folder(server: viser.ViserServer, scene: Scene, requests: Requests) -> None:
     """A checkbox a layer, and the length of arrows."""
     with server.gui.add_folder("Show"):
         for name, shown in scene.toggles.items():
             box = server.gui.add_checkbox(name, shown)
 
             def note(event: Any, name: str = name, box: Any = box) -> None:
-                wishes.toggles[name] = box.value
+                requests.toggles[name] = box.value
 
             box.on_update(note)
         if "Forces" in scene.toggles:
@@ -88,7 +88,7 @@ def add_show_folder(server: viser.ViserServer, scene: Scene, wishes: Wishes) -> 
 
             def resize(event: Any) -> None:
                 scene.set_arrow_scale(slider.value)
-                wishes.redraw = True
+                requests.redraw = True
 
             slider.on_update(resize)
 
@@ -96,7 +96,7 @@ def add_show_folder(server: viser.ViserServer, scene: Scene, wishes: Wishes) -> 
 class PlaybackControls:
     """Play and pause, time, speed, loop."""
 
-    def __init__(self, server: viser.ViserServer, playback: Playback, wishes: Wishes) -> None:
+    def __init__(self, server: viser.ViserServer, playback: Playback, requests: Requests) -> None:
         self._playback = playback
         span = playback.end - playback.start
         with server.gui.add_folder("Playback"):
@@ -117,13 +117,13 @@ class PlaybackControls:
                 playback.pause()
             else:
                 playback.play()
-            wishes.redraw = True
+            requests.redraw = True
 
         def scrub(event: Any) -> None:
             if event.client is not None:  # by a person, not by `show`
                 playback.pause()
                 playback.seek(self._time.value)
-                wishes.redraw = True
+                requests.redraw = True
 
         def set_speed(event: Any) -> None:
             playback.speed = SPEEDS[self._speed.value]
@@ -149,7 +149,7 @@ class JointChoice:
     """Which joint's load is told: from a list, by name, or by a click on its mark."""
 
     def __init__(
-        self, server: viser.ViserServer, scene: Scene, names: list[str], wishes: Wishes
+        self, server: viser.ViserServer, scene: Scene, names: list[str], requests: Requests
     ) -> None:
         self._many = len(names) > MOST_CHOICES
         self._input: Any
@@ -162,14 +162,14 @@ class JointChoice:
 
         def choose(event: Any) -> None:
             if self._input.value in self._known:
-                wishes.joint = self._input.value
+                requests.joint = self._input.value
             else:
                 self.tell(f"there is no joint {self._input.value!r}")
 
         def click(event: Any) -> None:
             if event.instance_index is not None:
                 self._input.value = names[event.instance_index]
-                wishes.joint = names[event.instance_index]
+                requests.joint = names[event.instance_index]
 
         self._input.on_update(choose)
         if scene.joint_marks is not None:

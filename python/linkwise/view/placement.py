@@ -1,4 +1,4 @@
-"""Where the parts of a picture are at a moment: the properties of a group of instances.
+"""Where the parts of a picture are in a snapshot: the properties of a group of instances.
 
 Each placement also says how it is made (`plan`), so that player.js makes the same pictures in an
 exported page: a kind there is a class here.
@@ -23,8 +23,8 @@ Indices = npt.NDArray[np.int64]
 
 
 @dataclass
-class Moment:
-    """One moment of the machine: frames of links and joints (n, 4, 4), loads (n_joints, 6)."""
+class Snapshot:
+    """The machine at one instant: frames of links and joints (n, 4, 4), loads (n_joints, 6)."""
 
     links: Array
     joints: Array
@@ -45,7 +45,7 @@ class LoadStyle:
 
 
 class Placement(Protocol):
-    def __call__(self, moment: Moment) -> dict[str, Any]:
+    def __call__(self, snapshot: Snapshot) -> dict[str, Any]:
         """What changes of the group's properties."""
 
     def plan(self) -> dict[str, Any]:
@@ -59,8 +59,8 @@ class Following:
     links: Indices
     offsets: Array
 
-    def __call__(self, moment: Moment) -> dict[str, Array]:
-        frames = moment.links[self.links] @ self.offsets
+    def __call__(self, snapshot: Snapshot) -> dict[str, Array]:
+        frames = snapshot.links[self.links] @ self.offsets
         return {
             "batched_positions": frames[:, :3, 3],
             "batched_wxyzs": quaternions(frames[:, :3, :3]),
@@ -83,8 +83,8 @@ class Spanning:
     outboard: Indices
     radius: float
 
-    def __call__(self, moment: Moment) -> dict[str, Array]:
-        here, there = (moment.joints[end, :3, 3] for end in (self.inboard, self.outboard))
+    def __call__(self, snapshot: Snapshot) -> dict[str, Array]:
+        here, there = (snapshot.joints[end, :3, 3] for end in (self.inboard, self.outboard))
         span = there - here
         length = np.linalg.norm(span, axis=1)
         along = np.where(length[:, None] > 0, span / np.maximum(length, 1e-300)[:, None], [0, 0, 1])
@@ -107,8 +107,8 @@ class Lines:
     inboard: Indices
     outboard: Indices
 
-    def __call__(self, moment: Moment) -> dict[str, Array]:
-        points = moment.joints[:, :3, 3]
+    def __call__(self, snapshot: Snapshot) -> dict[str, Array]:
+        points = snapshot.joints[:, :3, 3]
         return {"points": np.stack([points[self.inboard], points[self.outboard]], axis=1)}
 
     def plan(self) -> dict[str, Any]:
@@ -119,8 +119,8 @@ class Lines:
 class Marks:
     """One at every joint point."""
 
-    def __call__(self, moment: Moment) -> dict[str, Array]:
-        return {"batched_positions": moment.joints[:, :3, 3]}
+    def __call__(self, snapshot: Snapshot) -> dict[str, Array]:
+        return {"batched_positions": snapshot.joints[:, :3, 3]}
 
     def plan(self) -> dict[str, Any]:
         return {"kind": "marks"}
@@ -134,14 +134,14 @@ class Loads:
     style: LoadStyle
     joints: Indices
 
-    def __call__(self, moment: Moment) -> dict[str, Any]:
-        if moment.loads is None:
+    def __call__(self, snapshot: Snapshot) -> dict[str, Any]:
+        if snapshot.loads is None:
             return {}
-        frames = moment.joints[self.joints]
-        vectors = in_world(frames, moment.loads[self.joints])[self.half]
+        frames = snapshot.joints[self.joints]
+        vectors = in_world(frames, snapshot.loads[self.joints])[self.half]
         use = None
         if self.style.use is not None:
-            use = self.style.use.of(moment.loads, self.half)[self.joints]
+            use = self.style.use.of(snapshot.loads, self.half)[self.joints]
         points = frames[:, :3, 3]
         made = instances(points, vectors, self.style.largest[self.half], self.style.longest, use)
         return {
@@ -159,7 +159,7 @@ class Loads:
 class Fixed:
     """Nothing moves."""
 
-    def __call__(self, moment: Moment) -> dict[str, Any]:
+    def __call__(self, snapshot: Snapshot) -> dict[str, Any]:
         return {}
 
     def plan(self) -> dict[str, Any]:

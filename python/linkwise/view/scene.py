@@ -1,4 +1,4 @@
-"""The machine in viser: groups of instances, one message a group and moment however many links."""
+"""The machine in viser: groups of instances, one message per group and snapshot, for any links."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from linkwise.view.placement import (
     Loads,
     LoadStyle,
     Marks,
-    Moment,
     Placement,
+    Snapshot,
     Spanning,
 )
 from linkwise.view.shapes import (
@@ -46,7 +46,7 @@ _PLAIN = (0.62, 0.66, 0.70, 1.0)
 _MANY = 1500  # joints, above which marks at every joint only hide the links
 _SPARSE_LOADS, _SPARSE_POINTS = 60, 300  # of a machine with more: what a processor draws in time
 _THIN = 300  # joints, above which rods are thinner than a point of the screen
-_LOOKED_AT = 9  # moments of a run that the first picture makes room for
+_LOOKED_AT = 9  # snapshots of a run that the first picture makes room for
 _LIGHTEST = 1e-6  # of the whole: lighter links are placeholders, with any inertia
 _INSTANCES_A_SECOND = 500_000  # that viser's client takes in
 _ARROW_SHARE = 0.22  # of the machine's size: the largest load's arrow
@@ -54,14 +54,14 @@ _ARROW_SHARE = 0.22  # of the machine's size: the largest load's arrow
 
 @dataclass
 class Layer:
-    """Something drawn; `place` gives the properties of its handle that change with the moment."""
+    """Something drawn; `place` gives the properties of its handle that change with the snapshot."""
 
     handle: Any
     place: Placement
 
-    def show(self, moment: Moment) -> None:
+    def show(self, snapshot: Snapshot) -> None:
         if self.handle.visible:
-            for name, values in self.place(moment).items():
+            for name, values in self.place(snapshot).items():
                 setattr(self.handle, name, values)
 
 
@@ -78,16 +78,16 @@ class Scene:
         start = model.neutral_configuration()
         if source.recording is not None:
             start = source.recording.position(0)
-        self._moment = self.at(start, None)
-        moments = [self._moment]
+        self._snapshot = self.at(start, None)
+        snapshots = [self._snapshot]
         if source.recording is not None:
             last = source.recording.times.size - 1
             some = np.unique(np.linspace(0, last, _LOOKED_AT).astype(int))
-            moments = [self.at(source.recording.position(k), None) for k in some]
-        self.center, self.size = _extent(moments, model)
+            snapshots = [self.at(source.recording.position(k), None) for k in some]
+        self.center, self.size = _extent(snapshots, model)
         self.style = LoadStyle((0.0, 0.0), _ARROW_SHARE * self.size)
         self.toggles: dict[str, bool] = {}
-        self._add_looks(source)
+        self._add_visuals(source)
         self._add_shapes(bare="Meshes" not in self.toggles)
         if source.recording is None or source.recording.has_loads:
             shown = source.recording is not None
@@ -97,28 +97,28 @@ class Scene:
         for name, shown in self.toggles.items():
             self.toggle(name, shown)
 
-    # -- moments ----------------------------------------------------------------------------
+    # -- snapshots ----------------------------------------------------------------------------
 
-    def at(self, q: Array, loads: Array | None) -> Moment:
+    def at(self, q: Array, loads: Array | None) -> Snapshot:
         links = np.asarray(_core.link_poses(self._model, q))
-        return Moment(links, np.asarray(_core.body_poses(self._model, q)), loads)
+        return Snapshot(links, np.asarray(_core.body_poses(self._model, q)), loads)
 
-    def show(self, moment: Moment) -> None:
-        self._moment = moment
+    def show(self, snapshot: Snapshot) -> None:
+        self._snapshot = snapshot
         for layers in self.layers.values():
             for layer in layers:
-                layer.show(moment)
+                layer.show(snapshot)
 
     def toggle(self, name: str, shown: bool) -> None:
         """Show or hide a layer. Hidden ones are not kept up to date, so it is placed again."""
         self.toggles[name] = shown
         for layer in self.layers[name]:
             layer.handle.visible = shown
-            layer.show(self._moment)
+            layer.show(self._snapshot)
 
     @property
     def drawing_time(self) -> float:
-        """Seconds to leave a client between two moments: more often, and they would queue there."""
+        """Seconds to leave a client between snapshots: more often, and they would queue there."""
         shown = sum(
             len(layer.handle.batched_positions)
             for layers in self.layers.values()
@@ -149,22 +149,22 @@ class Scene:
             **style,
         )
 
-    def _add_looks(self, source: Source) -> None:
+    def _add_visuals(self, source: Source) -> None:
         """The visuals of the model's file; equal meshes are instances of one."""
         index = {name: k for k, name in enumerate(self._model.link_names)}
         groups: dict[tuple[str, Path | None, Any], list[Visual]] = defaultdict(list)
-        for visual in source.looks.visuals:
+        for visual in source.appearance.visuals:
             if visual.link in index:
                 scale = visual.size if visual.shape == "mesh" else None
                 groups[visual.shape, visual.path, (scale, visual.color)].append(visual)
         for (shape, path, _), visuals in groups.items():
             links = np.array([index[visual.link] for visual in visuals])
             offsets = np.stack([visual.placement for visual in visuals])
-            handle = self._add_look(shape, path, visuals, source.notes)
+            handle = self._add_visual_group(shape, path, visuals, source.notes)
             if handle is not None:
                 self.layers["Meshes"].append(Layer(handle, Following(links, offsets)))
 
-    def _add_look(
+    def _add_visual_group(
         self, shape: str, path: Path | None, visuals: list[Visual], notes: list[str]
     ) -> Any:
         first = visuals[0]
@@ -206,7 +206,7 @@ class Scene:
         offsets[:, :3, :3] = boxes.axes
         offsets[:, :3, 3] = model.link_centers_of_mass
         solid = np.flatnonzero(boxes.edges.max(axis=1, initial=0.0) > 0)
-        near = solid[_stays_near(self._moment, model, boxes.edges, offsets)[solid]]
+        near = solid[_stays_near(self._snapshot, model, boxes.edges, offsets)[solid]]
         near = near[model.link_masses[near] > _LIGHTEST * model.link_masses.sum()]
         for toggle, chosen, shown, style in (
             (links, near, bare and few, {"batched_colors": _TONES[near % 2]}),
@@ -254,7 +254,7 @@ class Scene:
 
     def _thickness(self) -> float:
         """Radius of the joint marks: small beside the links and, of short chains, the machine."""
-        points = self._moment.joints[:, :3, 3]
+        points = self._snapshot.joints[:, :3, 3]
         spans = np.linalg.norm(points - points[self._inboard], axis=1)[self._inboard >= 0]
         spans = spans[spans > 1e-6 * self.size]
         typical = float(np.mean(spans)) if spans.size else self.size
@@ -296,7 +296,7 @@ class Scene:
     def _frame_camera(self, server: viser.ViserServer) -> None:
         self._scene.set_up_direction("+z")
         camera = server.initial_camera
-        right, away = _across(self._moment)
+        right, away = _across(self._snapshot)
         middle = self.center + 0.2 * self.size * right  # the panel covers the right of the window
         camera.position = middle + 1.5 * self.size * away
         camera.look_at = middle
@@ -321,7 +321,7 @@ class Scene:
 
     def _floor(self) -> float:
         """Height of the grid: the lowest point, or the ground where the machine stands on it."""
-        points = np.concatenate([self._moment.links[:, :3, 3], self._moment.joints[:, :3, 3]])
+        points = np.concatenate([self._snapshot.links[:, :3, 3], self._snapshot.joints[:, :3, 3]])
         return min(0.0, float(points[:, 2].min()) - 0.02 * self.size)
 
 
@@ -344,9 +344,9 @@ def _sparse_tree(inboard: Any, most: int) -> tuple[Any, Any]:
     return ends[ends >= 0], outboard[ends >= 0]
 
 
-def _across(moment: Moment) -> tuple[Array, Array]:
+def _across(snapshot: Snapshot) -> tuple[Array, Array]:
     """Unit vectors to the right and to the camera, which sees the machine from its broad side."""
-    points = np.concatenate([moment.links[:, :2, 3], moment.joints[:, :2, 3]])
+    points = np.concatenate([snapshot.links[:, :2, 3], snapshot.joints[:, :2, 3]])
     spread, axes = np.linalg.eigh(np.cov(points.T))
     x, y = axes[:, 1] if spread[1] > 1.5 * spread[0] else (1.0, 0.0)
     turn = 0.35  # not quite broadside, so that the picture has depth
@@ -356,14 +356,14 @@ def _across(moment: Moment) -> tuple[Array, Array]:
     return right, away / np.linalg.norm(away)
 
 
-def _extent(moments: list[Moment], model: _core.Model) -> tuple[Array, float]:
+def _extent(snapshots: list[Snapshot], model: _core.Model) -> tuple[Array, float]:
     """Centre and size of where the machine is: of its joint points, centres of mass and boxes."""
     boxes = equivalent_boxes(model.link_masses, model.link_inertias).edges
     found = []
-    for moment in moments:
-        centers = np.einsum("nij,nj->ni", moment.links[:, :3, :3], model.link_centers_of_mass)
-        centers = (centers + moment.links[:, :3, 3])[model.link_masses > 0]
-        found += [moment.joints[:, :3, 3], moment.links[:, :3, 3], centers]
+    for snapshot in snapshots:
+        centers = np.einsum("nij,nj->ni", snapshot.links[:, :3, :3], model.link_centers_of_mass)
+        centers = (centers + snapshot.links[:, :3, 3])[model.link_masses > 0]
+        found += [snapshot.joints[:, :3, 3], snapshot.links[:, :3, 3], centers]
     points = np.concatenate(found)
     low, high = points.min(axis=0), points.max(axis=0)
     size = float(np.linalg.norm(high - low))
@@ -371,7 +371,7 @@ def _extent(moments: list[Moment], model: _core.Model) -> tuple[Array, float]:
     return (low + high) / 2, max(size, largest, 1e-3)
 
 
-def _stays_near(moment: Moment, model: _core.Model, edges: Array, offsets: Array) -> Any:
+def _stays_near(snapshot: Snapshot, model: _core.Model, edges: Array, offsets: Array) -> Any:
     """Which links' boxes lie about where the link is: between its joint points.
 
     An inertia that is published about a joint, with no first moment, gives a box that sticks out
@@ -380,7 +380,7 @@ def _stays_near(moment: Moment, model: _core.Model, edges: Array, offsets: Array
     names = {name: k for k, name in enumerate(model.link_names)}
     link_of = np.array([names[name] for name in model.body_names], dtype=int)
     inboard = np.array(model.joint_parents, dtype=int)
-    points = moment.joints[:, :3, 3]
+    points = snapshot.joints[:, :3, 3]
     outboard = np.flatnonzero(inboard >= 0)
     reach, middle = np.zeros(len(edges)), np.zeros((len(edges), 3))
     for joint in outboard:  # the farthest outboard joint point of each link
@@ -390,6 +390,6 @@ def _stays_near(moment: Moment, model: _core.Model, edges: Array, offsets: Array
         if distance > reach[link]:
             reach[link] = distance
             middle[link] = points[inboard[joint]] + span / 2
-    centers = (moment.links @ offsets)[:, :3, 3]
+    centers = (snapshot.links @ offsets)[:, :3, 3]
     far = np.linalg.norm(centers - middle, axis=1) + 0.5 * np.linalg.norm(edges, axis=1)
     return (reach == 0) | (far <= 0.8 * reach)

@@ -20,7 +20,7 @@ class Mesh(NamedTuple):
 
 
 class Boxes(NamedTuple):
-    """Edges (n, 3) [m] and axes (n, 3, 3) of a box a link; edges 0 where there is none."""
+    """Edges (n, 3) [m] and axes (n, 3, 3) of one box per link; edges 0 where a link has none."""
 
     edges: Array
     axes: Array

@@ -13,7 +13,7 @@ import numpy as np
 from linkwise._core import InputError, Model, inverse_dynamics_loads
 from linkwise.base import Array, rows_per_block
 from linkwise.io.complaint import near
-from linkwise.io.urdf_visuals import Looks, read_looks
+from linkwise.io.urdf_visuals import Appearance, read_appearance
 from linkwise.results.samples import rows
 from linkwise.scenario import load_ratings, load_scenario, ratings_in
 from linkwise.view.shown_loads import CauseLoads
@@ -27,11 +27,11 @@ PathLike = str | os.PathLike[str]
 
 @dataclass(frozen=True)
 class Options:
-    """How to find a model and its looks.
+    """How to find a model and its appearance.
 
-    model: file to take model or looks from instead of the run's own; package_dirs, floating_base:
-    as in linkwise.load; loads: whether joint loads are shown; ratings: a file of them instead of
-    the scenario's; causes: only the loads that these cause.
+    model: file to take model or appearance from instead of the run's own; package_dirs,
+    floating_base: as in linkwise.load; loads: whether joint loads are shown; ratings: a file of
+    them instead of the scenario's; causes: only the loads that these cause.
     """
 
     model: Path | None = None
@@ -129,7 +129,7 @@ class Source:
 
     title: str
     model: Model
-    looks: Looks
+    appearance: Appearance
     recording: Recording | None = None
     ratings: Mapping[str, Rating] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
@@ -154,10 +154,10 @@ def open_source(target: PathLike, options: Options) -> Source:
     if options.causes:
         raise InputError(f"{str(path)!r}: causes go with a run, and this is a file; leave them out")
     model, file, package_dirs = _load_model(path, options)
-    looks = Looks([], [], []) if file is None else read_looks(file, package_dirs)
+    appearance = Appearance([], [], []) if file is None else read_appearance(file, package_dirs)
     held = load_scenario(path).text if path.suffix.lower() == ".toml" else ""
     ratings = _ratings(options, held)
-    return Source(model.name, model, looks, None, ratings, _notes(looks))
+    return Source(model.name, model, appearance, None, ratings, _notes(appearance))
 
 
 def _ratings(options: Options, scenario: str) -> Mapping[str, Rating]:
@@ -195,18 +195,18 @@ def _open_run(path: Path, options: Options) -> Source:
     else:
         model, package_dirs = read_model(path), options.package_dirs
         file = _file_beside(path, str(run.dataset.attrs.get("model_source", "")))
-    looks = Looks([], [], [])
+    appearance = Appearance([], [], [])
     if file is not None:
-        looks = read_looks(file, package_dirs)
-        if set(looks.links) - set(model.link_names):  # another machine under the same name
-            looks = Looks([], [], [])
+        appearance = read_appearance(file, package_dirs)
+        if set(appearance.links) - set(model.link_names):  # another machine under the same name
+            appearance = Appearance([], [], [])
     recording = Recording(run, model, loads=options.loads)
     if options.causes:
         if recording.causes is None:
             raise InputError("causes: are those of loads, and --no-loads hides them; leave one out")
         recording.causes.choose(options.causes)
     ratings = _ratings(options, str(run.dataset.attrs.get("scenario", "")))
-    return Source(model.name, model, looks, recording, ratings, _notes(looks))
+    return Source(model.name, model, appearance, recording, ratings, _notes(appearance))
 
 
 def _file_beside(path: Path, name: str) -> Path | None:
@@ -226,11 +226,11 @@ def _check_same_machine(run: Run, model: Model, file: Path) -> None:
             )
 
 
-def _notes(looks: Looks) -> list[str]:
-    if not looks.missing:
+def _notes(appearance: Appearance) -> list[str]:
+    if not appearance.missing:
         return []
-    first = Path(looks.missing[0]).name
+    first = Path(appearance.missing[0]).name
     return [
-        f"{len(looks.missing)} meshes are not on this disk (the first is {first!r}); "
+        f"{len(appearance.missing)} meshes are not on this disk (the first is {first!r}); "
         "--package-dir says where packages are"
     ]

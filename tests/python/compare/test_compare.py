@@ -11,7 +11,7 @@ from linkwise import compare
 def hub():
     """A body with three outboard joints: Jacobi diverges there, and it is no chain."""
     model = lw.scenes.tree(13, branching=3, joint="universal")
-    motion = compare.free_motion(model, states=3, seed=0)
+    motion = compare.free_trajectory(model, states=3, seed=0)
     return compare.compare(model, motion, time_limit=1.0)
 
 
@@ -54,7 +54,7 @@ def test_errors_are_against_the_recursion(hub):
 
 def test_what_takes_too_long_is_stopped_and_shown():
     model = lw.scenes.chain(64, axes="parallel")
-    motion = compare.free_motion(model, states=2, seed=0)
+    motion = compare.free_trajectory(model, states=2, seed=0)
     found = compare.compare(model, motion, time_limit=1e-3)
     assert found["unknowns"] == 320
     slow = [row for row in found["rows"] if row["outcome"] == "too slow"]
@@ -69,7 +69,7 @@ def test_a_singular_inertia_leaves_the_other_methods():
     builder.add_link("bob", mass=1.0, com=(0, 0, -1.0))
     builder.add_joint("pivot", "revolute", "ground", "bob", axis=(0, 1, 0))
     model = builder.build()
-    found = compare.compare(model, compare.free_motion(model, states=2, seed=0))
+    found = compare.compare(model, compare.free_trajectory(model, states=2, seed=0))
     assert found["unknowns"] is None
     assert "bob" in found["system_message"]
     for row in found["rows"]:

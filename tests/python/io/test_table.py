@@ -80,11 +80,11 @@ GAP = "give a finite number in every cell"
         ),
         (
             "time,a\n0,1\n1\n",
-            ":3: row: has 1 cells where the header has 2; give every row one number a column",
+            ":3: row: has 1 cells where the header has 2; give every row one number per column",
         ),
         (
             "time,a\n0,1\n1,2,3\n",
-            ":3: row: has 3 cells where the header has 2; give every row one number a column",
+            ":3: row: has 3 cells where the header has 2; give every row one number per column",
         ),
         ("time,a\n0,1\n1,nan\n", f":3: column 'a': 'nan' is not a finite number; {GAP}"),
         ("time,a\n0,1\n1,-inf\n", f":3: column 'a': '-inf' is not a finite number; {GAP}"),

@@ -15,7 +15,7 @@ from helpers.browser import PATIENCE, WINDOW
 from linkwise.view.export import write_html
 from linkwise.view.scene import Scene
 from linkwise.view.server import running
-from linkwise.view.source import Looks, Options, Source, open_source
+from linkwise.view.source import Appearance, Options, Source, open_source
 
 pytest.importorskip("viser", reason="the view needs viser: pip install '.[view]'")
 imageio = pytest.importorskip("imageio.v3")
@@ -194,7 +194,7 @@ def test_run_is_drawn_plays_scrubs_and_toggles(serve, run_path, ratings_path, pa
 
 def test_model_is_posed_with_sliders(serve, page):
     model = lw.scenes.chain(3)
-    open_page(page, serve(Source("chain", model, Looks([], [], []))))
+    open_page(page, serve(Source("chain", model, Appearance([], [], []))))
     before = still(page)
     page.get_by_role("slider").first.press("End")
     wait_for(page, lambda image: changed(image, before) > 200, "moved")
@@ -262,7 +262,7 @@ def test_exported_page_plays_and_toggles_without_a_network(run_path, ratings_pat
 
 def test_exported_model_is_a_still(tmp_path, page):
     written = write_html(
-        Source("chain", lw.scenes.chain(3), Looks([], [], [])), tmp_path / "c.html"
+        Source("chain", lw.scenes.chain(3), Appearance([], [], [])), tmp_path / "c.html"
     )
     page.context.set_offline(True)
     open_page(page, written.path.as_uri())

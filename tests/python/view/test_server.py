@@ -11,7 +11,7 @@ import linkwise as lw
 from linkwise.view.export import frame_samples, write_html
 from linkwise.view.scene import Scene
 from linkwise.view.server import running
-from linkwise.view.source import Looks, Options, Source, open_source, static_loads
+from linkwise.view.source import Appearance, Options, Source, open_source, static_loads
 
 pytest.importorskip("viser", reason="the view needs viser: pip install '.[view]'")
 
@@ -67,7 +67,7 @@ def test_frames_are_even_in_time_and_bounded():
 
 def test_ten_thousand_links_take_one_message_a_group():
     model = lw.scenes.chain(10_000)
-    source = Source("chain", model, Looks([], [], []))
+    source = Source("chain", model, Appearance([], [], []))
     with running("127.0.0.1", 0, "chain") as server:
         scene = Scene(server, source)
         for name in scene.toggles:

@@ -1,4 +1,4 @@
-"""What is opened: runs with the model that they hold, models with their looks."""
+"""What is opened: runs with the model that they hold, models with their appearance."""
 
 import shutil
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 
 import linkwise as lw
 from linkwise import base
-from linkwise.io.urdf_visuals import read_looks
+from linkwise.io.urdf_visuals import read_appearance
 from linkwise.record.machine import GROUP, read_model
 from linkwise.view.source import Options, open_source, static_loads
 
@@ -97,19 +97,19 @@ def test_static_loads_carry_the_weight(urdf):
     assert load[0] == pytest.approx([0, 0, 2 * 9.81, 0, 0, 0], abs=1e-12)
 
 
-def test_looks_are_read_and_nothing_is_fetched(urdf, tmp_path):
-    looks = read_looks(urdf)
-    assert looks.links == ["base", "upper"]
-    assert [visual.shape for visual in looks.visuals] == ["box", "sphere"]
-    assert looks.missing == ["package://parts/base.stl", "http://example.org/far.stl"]
-    box = looks.visuals[0]
+def test_the_appearance_is_read_and_nothing_is_fetched(urdf, tmp_path):
+    appearance = read_appearance(urdf)
+    assert appearance.links == ["base", "upper"]
+    assert [visual.shape for visual in appearance.visuals] == ["box", "sphere"]
+    assert appearance.missing == ["package://parts/base.stl", "http://example.org/far.stl"]
+    box = appearance.visuals[0]
     assert box.color == (0, 0, 1, 1)
     assert box.size == (0.1, 0.2, 1)
     assert box.placement == pytest.approx(
         np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0.5], [0, 0, 0, 1]]), abs=1e-12
     )
     write_stl(tmp_path / "parts" / "base.stl")
-    found = read_looks(urdf).visuals[0]
+    found = read_appearance(urdf).visuals[0]
     assert (found.link, found.path) == ("base", tmp_path / "parts" / "base.stl")
     assert found.size == (2, 2, 2)
 
@@ -124,17 +124,19 @@ def test_roll_pitch_yaw_as_in_the_simulation(tmp_path):
         )
     )
     placed = lw.link_poses(lw.load(path), np.zeros(1))[1]
-    assert read_looks(path).visuals[0].placement[:3, :3] == pytest.approx(placed[:3, :3], abs=1e-12)
+    assert read_appearance(path).visuals[0].placement[:3, :3] == pytest.approx(
+        placed[:3, :3], abs=1e-12
+    )
 
 
-def test_run_takes_its_looks_from_the_file_beside_it(urdf, tmp_path, monkeypatch):
+def test_run_takes_its_appearance_from_the_file_beside_it(urdf, tmp_path, monkeypatch):
     lw.simulate(lw.load(urdf), duration=0.1, output=tmp_path / "run.zarr")
-    assert len(open_source(tmp_path / "run.zarr", Options()).looks.visuals) == 2
+    assert len(open_source(tmp_path / "run.zarr", Options()).appearance.visuals) == 2
     other = URDF.replace('"base"', '"pedestal"')
     urdf.write_text(other)
-    assert open_source(tmp_path / "run.zarr", Options()).looks.visuals == []
+    assert open_source(tmp_path / "run.zarr", Options()).appearance.visuals == []
     urdf.unlink()
-    assert open_source(tmp_path / "run.zarr", Options()).looks.visuals == []
+    assert open_source(tmp_path / "run.zarr", Options()).appearance.visuals == []
 
 
 def test_missing_meshes_are_told(urdf):
@@ -149,7 +151,7 @@ def test_scenario_shows_its_model(tmp_path):
     assert open_source(path, Options()).model.n_joints == 3
 
 
-def test_scenario_finds_the_looks_of_its_file(urdf, tmp_path):
+def test_scenario_finds_the_appearance_of_its_file(urdf, tmp_path):
     path = Path(tmp_path / "swing.toml")
     path.write_text('model = "arm.urdf"\n[simulate]\nduration = 1\n')
-    assert len(open_source(path, Options()).looks.visuals) == 2
+    assert len(open_source(path, Options()).appearance.visuals) == 2
