@@ -2,7 +2,7 @@
 
 Run it by: python examples/06_solvers.py
 
-Iterations are means an evaluation of the equations of motion, each started from the cubic through
+Iterations are means per evaluation of the equations of motion, each started from the cubic through
 the last four solutions. The machine is a stand-in for the arm of [sharf1993]: three rods, five
 degrees of freedom, 13 unknown constraint forces. The motion is its spatial manoeuvre, its torques
 are applied open loop.

@@ -213,9 +213,9 @@ def write_report(
 
     Args:
         run: Holds `joint_load`; figures that need other quantities are left out without them.
-        path: The HTML file, replaced where it exists.
-        found: "summary", and "bounds" and "margins" or None, as the functions of that name give.
-        model: The machine, where the run does not hold it.
+        path: The HTML file; an existing one is replaced.
+        found: Results of the functions "summary", "bounds" and "margins"; the last two may be None.
+        model: The machine, if the run does not hold it.
     """
     plotly = _plotly()
     target = Path(path)

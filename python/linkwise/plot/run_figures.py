@@ -38,7 +38,7 @@ class RunPlots:
         self._run = run
 
     def loads(self, joint: str) -> Any:
-        """Force and moment of a joint over time, by component (joint frame, joint point)."""
+        """Force and moment of a joint over time, by component, at the joint point in its frame."""
         where = joint_position(self._run, joint)
         load = self._run.dataset["joint_load"].isel(joint=where)
         figure, axes = _figure(2)

@@ -30,12 +30,12 @@ def _simulate(scenario: Scenario) -> xr.Dataset:
 
 
 def _check(scenario: Scenario) -> None:
-    """InputError for a member that cannot be simulated; before any is."""
+    """InputError for a member that cannot be simulated, before any member is."""
     scenario.simulate_arguments(scenario.load_model())
 
 
 def _coordinate(values: Sequence[Any]) -> Any:
-    """The values of one axis, a member each, as an array that files keep."""
+    """The values of one axis, one per member, as an array that files can hold."""
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
         return np.array(values, dtype=np.float64)
     return np.array([v if isinstance(v, str) else repr(v) for v in values], dtype=np.str_)

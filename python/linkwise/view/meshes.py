@@ -27,7 +27,7 @@ def load_mesh(
     try:
         scene = trimesh.load_scene(path)
         mesh = scene.to_mesh()
-    except Exception:  # parsers of a dozen formats: they raise what comes to hand
+    except Exception:  # parsers of a dozen formats, which raise exceptions of any kind
         return None
     if not isinstance(mesh, trimesh.Trimesh) or not 0 < len(mesh.faces) <= MOST_FACES:
         return None

@@ -1,4 +1,4 @@
-"""The controls beside the scene. Callbacks note what is wanted; `live` acts on it in one thread."""
+"""The controls beside the scene. Callbacks note requests; `live` acts on them in one thread."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def add_load_choices(
 
 
 def add_show_folder(server: viser.ViserServer, scene: Scene, requests: Requests) -> None:
-    """A checkbox a layer, and the length of arrows."""
+    """One checkbox per layer, and the length of arrows."""
     with server.gui.add_folder("Show"):
         for name, shown in scene.toggles.items():
             box = server.gui.add_checkbox(name, shown)
@@ -146,7 +146,7 @@ class PlaybackControls:
 
 
 class JointChoice:
-    """Which joint's load is told: from a list, by name, or by a click on its mark."""
+    """The joint whose load is plotted: chosen from a list, by name, or by a click on its mark."""
 
     def __init__(
         self, server: viser.ViserServer, scene: Scene, names: list[str], requests: Requests

@@ -26,7 +26,7 @@ class Playback:
         self.time = self.start
 
     def play(self) -> None:
-        """Go on; from the start where the end was reached."""
+        """Go on, or start again if the end was reached."""
         if self.time >= self.end:
             self.time = self.start
         self.playing = self.end > self.start

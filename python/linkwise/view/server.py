@@ -28,7 +28,7 @@ def _viser() -> Any:
 
 
 def check_address(host: str, port: int) -> None:
-    """InputError unless a server may listen there; viser itself would take another port."""
+    """InputError unless a server may listen there. (viser itself would take another port.)"""
     if not 0 <= port <= 65535:
         raise InputError(
             f"port {port}: is not a port; give a number from 0 (any free one) to 65535"
