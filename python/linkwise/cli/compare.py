@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from linkwise.cli.model import FloatingBase, PackageDirs, load_given
 from linkwise.cli.output import JsonOption, console, number, print_json, table, text
 from linkwise.cli.progress import live_steps
-
-if TYPE_CHECKING:
-    from linkwise._core import Model
-    from linkwise.compare import Trajectory
 
 
 def compare(
@@ -36,13 +33,8 @@ def compare(
         Path | None,
         typer.Option("--plot", help="Write a chart (SVG) to this file.", show_default=False),
     ] = None,
-    floating_base: Annotated[
-        bool, typer.Option("--floating-base", help="Let the root link of a model file float.")
-    ] = False,
-    package_dir: Annotated[
-        list[Path] | None,
-        typer.Option("--package-dir", help="Where packages of package:// paths are; repeatable."),
-    ] = None,
+    floating_base: FloatingBase = False,
+    package_dir: PackageDirs = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run every method, solver and initial guess on MODEL or SCENARIO and compare them.
@@ -51,11 +43,16 @@ def compare(
     Iterative solvers start from the solutions of the steps before.
     """
     from linkwise.compare import compare as run_comparison
+    from linkwise.compare import driven_trajectory, free_trajectory
     from linkwise.compare import plot as draw
 
     if plot is not None and plot.suffix.lower() != ".svg":
         raise typer.BadParameter(f"{plot}: charts are written as SVG; name a file in .svg")
-    loaded, trajectory = _trajectory(model, states, seed, floating_base, package_dir or [])
+    loaded, scenario = load_given(model, floating_base, package_dir)
+    if scenario is None:
+        trajectory = free_trajectory(loaded, states, seed)
+    else:
+        trajectory = driven_trajectory(loaded, scenario.simulate_arguments(loaded), states)
     with live_steps(quiet=as_json) as progress:
         found = run_comparison(
             loaded, trajectory, tolerance=tolerance, stop=stop, time_limit=limit, progress=progress
@@ -67,25 +64,6 @@ def compare(
         print_json(found)
     else:
         _show(found)
-
-
-def _trajectory(
-    path: Path, states: int, seed: int, floating_base: bool, package_dirs: list[Path]
-) -> tuple[Model, Trajectory]:
-    from linkwise.compare import driven_trajectory, free_trajectory
-    from linkwise.io.load import load
-    from linkwise.scenario import load_scenario
-
-    if path.suffix.lower() != ".toml":
-        model = load(
-            path, floating_base=floating_base, package_dirs=package_dirs, mimic="independent"
-        )
-        return model, free_trajectory(model, states, seed)
-    if floating_base or package_dirs:
-        raise typer.BadParameter("a scenario says itself how its model is loaded; edit it")
-    scenario = load_scenario(path)
-    model = scenario.load_model()
-    return model, driven_trajectory(model, scenario.simulate_arguments(model), states)
 
 
 def _show(found: dict[str, Any]) -> None:

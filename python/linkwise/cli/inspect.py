@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from linkwise.cli.model import FloatingBase, PackageDirs, load_given
 from linkwise.cli.output import JsonOption, console, number, print_json, table, text
 
 if TYPE_CHECKING:
@@ -20,18 +21,13 @@ def inspect(
     model: Annotated[
         Path, typer.Argument(metavar="MODEL", help="Model file (URDF, MJCF) or scenario.")
     ],
-    floating_base: Annotated[
-        bool, typer.Option("--floating-base", help="Let the root link float.")
-    ] = False,
-    package_dir: Annotated[
-        list[Path] | None,
-        typer.Option("--package-dir", help="Where packages of package:// paths are; repeatable."),
-    ] = None,
+    floating_base: FloatingBase = False,
+    package_dir: PackageDirs = None,
     every_row: Annotated[bool, typer.Option("--all", help="Show all rows of long models.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Show the joints, bodies and masses of MODEL, what was merged and why, and warnings."""
-    found = describe_model(_load(model, floating_base, package_dir or []))
+    found = describe_model(load_given(model, floating_base, package_dir)[0])
     if as_json:
         print_json(found)
         return
@@ -42,17 +38,6 @@ def inspect(
     notes = found["notes"]
     if notes:
         screen.print(_note_table(notes, len(notes) if every_row else _MOST_ROWS))
-
-
-def _load(path: Path, floating_base: bool, package_dirs: Sequence[Path]) -> Model:
-    from linkwise.io.load import load
-    from linkwise.scenario import load_scenario
-
-    if path.suffix.lower() == ".toml":
-        if floating_base or package_dirs:
-            raise typer.BadParameter("a scenario says itself how its model is loaded; edit it")
-        return load_scenario(path).load_model()
-    return load(path, floating_base=floating_base, package_dirs=package_dirs, mimic="independent")
 
 
 def describe_model(model: Model) -> dict[str, Any]:

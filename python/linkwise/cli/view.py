@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from linkwise.cli.model import FloatingBase, PackageDirs
 from linkwise.cli.output import JsonOption, console, print_json, say
 
 
@@ -42,13 +43,8 @@ def view(
             show_default=False,
         ),
     ] = None,
-    package_dir: Annotated[
-        list[Path] | None,
-        typer.Option("--package-dir", help="Where packages of package:// paths are; repeatable."),
-    ] = None,
-    floating_base: Annotated[
-        bool, typer.Option("--floating-base", help="Let the root link of a model file float.")
-    ] = False,
+    package_dir: PackageDirs = None,
+    floating_base: FloatingBase = False,
     no_loads: Annotated[
         bool, typer.Option("--no-loads", help="Show the motion of a run alone.")
     ] = False,

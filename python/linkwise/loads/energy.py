@@ -8,12 +8,7 @@ import numpy as np
 
 from linkwise import _core
 from linkwise.base import Array
-from linkwise.results.samples import (
-    external,
-    model_of,
-    need_whole,
-    rows,
-)
+from linkwise.results.samples import external, model_of, need_whole, rows
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from linkwise.base import Array
-from linkwise.results.samples import (
-    Selection,
-    joint_names,
-    model_of,
-    need,
-    rows,
-    select,
-)
+from linkwise.results.samples import Selection, joint_names, model_of, need, rows, select
 
 if TYPE_CHECKING:
     import xarray as xr

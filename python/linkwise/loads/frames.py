@@ -10,12 +10,7 @@ import numpy.typing as npt
 from linkwise import _core
 from linkwise._core import InputError
 from linkwise.base import Array
-from linkwise.results.samples import (
-    joint_names,
-    model_of,
-    need_whole,
-    rows,
-)
+from linkwise.results.samples import joint_names, model_of, need_whole, rows
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.base import Array
-from linkwise.loads.engineering import (
-    QUANTITIES,
-    derived_rows,
-    has_power,
-    joint_directions,
-)
+from linkwise.loads.engineering import QUANTITIES, derived_rows, has_power, joint_directions
 from linkwise.results.samples import (
     blocks,
     joint_names,

@@ -19,13 +19,8 @@ from linkwise.base import Array
 from linkwise.loads.causes import Split, along_total
 from linkwise.loads.engineering import derive, joint_directions
 from linkwise.loads.fatigue import load_duration, spectrum
-from linkwise.results.samples import (
-    blocks,
-    joint_names,
-    model_of,
-    rows,
-    select,
-)
+from linkwise.plot.run_figures import HALVES
+from linkwise.results.samples import blocks, joint_names, model_of, rows, select
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -34,7 +29,6 @@ if TYPE_CHECKING:
 Figure = dict[str, Any]
 TIMES = "times"
 """Stands for the times of the samples drawn, which the page holds once."""
-_HALVES = (("force", "N", ("fx", "fy", "fz")), ("moment", "N m", ("nx", "ny", "nz")))
 
 
 def packed(values: npt.ArrayLike) -> dict[str, str]:
@@ -69,7 +63,7 @@ def _line(name: str, x: Any, y: npt.ArrayLike, **more: Any) -> Figure:
 
 def _histories(load: Array) -> list[Figure]:
     made = []
-    for k, (half, unit, components) in enumerate(_HALVES):
+    for k, (half, unit, components) in enumerate(HALVES):
         part = load[:, 3 * k : 3 * k + 3]
         data = [_line(name, TIMES, part[:, c]) for c, name in enumerate(components)]
         data.append(_line("size", TIMES, np.linalg.norm(part, axis=1), line={"color": "black"}))
@@ -82,7 +76,7 @@ def _areas(shares: Array, causes: list[str]) -> list[Figure]:
     """Stacked areas: what adds to the size above zero, what relieves below."""
     colours = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
     made = []
-    for k, (half, unit, _) in enumerate(_HALVES):
+    for k, (half, unit, _) in enumerate(HALVES):
         parts, total = along_total(shares[..., 3 * k : 3 * k + 3])
         data = []
         for sign, group in ((1.0, "up"), (-1.0, "down")):
@@ -131,7 +125,7 @@ def _polar(load: Array, direction: Array) -> Figure:
 
 def _spectra(run: Run, joint: str, half: int) -> Figure:
     data = []
-    kind, unit, components = _HALVES[half]
+    kind, unit, components = HALVES[half]
     for component in components:
         found = spectrum(run, joint, component)
         frequency = found["frequency"].values[1:]
@@ -194,7 +188,7 @@ def _engineering(load: Array, direction: Array, half: int) -> Figure:
     names = (("axial", "radial"), ("torque", "tilting_moment"))[half]
     data = [_line(name.replace("_", " "), TIMES, found[name][:, 0]) for name in names]
     title = ("Force along and across the axis", "Moment about and across the axis")[half]
-    kind, unit, _ = _HALVES[half]
+    kind, unit, _ = HALVES[half]
     return {"data": data, "layout": _layout(title, "time [s]", f"{kind} [{unit}]")}
 
 

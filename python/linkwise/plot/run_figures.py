@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from linkwise.loads.causes import By
     from linkwise.results import Run
 
-_HALVES = (("force", "N", ("fx", "fy", "fz")), ("moment", "N m", ("nx", "ny", "nz")))
+HALVES = (("force", "N", ("fx", "fy", "fz")), ("moment", "N m", ("nx", "ny", "nz")))
 
 
 def _figure(rows: int) -> tuple[Any, Any]:
@@ -43,7 +43,7 @@ class RunPlots:
         load = self._run.dataset["joint_load"].isel(joint=where)
         figure, axes = _figure(2)
         times = self._run.dataset["time"].values
-        for axis, (half, unit, components) in zip(axes, _HALVES, strict=True):
+        for axis, (half, unit, components) in zip(axes, HALVES, strict=True):
             for name in components:
                 axis.plot(times, load.sel(component=name).values, label=name, linewidth=1.2)
             axis.set_ylabel(f"{half} [{unit}]")
@@ -61,7 +61,7 @@ class RunPlots:
         shares = split(self._run, by).isel(joint=where)
         times, causes = shares["time"].values, [str(c) for c in shares["cause"].values]
         figure, axes = _figure(2)
-        for k, (axis, (half, unit, _)) in enumerate(zip(axes, _HALVES, strict=True)):
+        for k, (axis, (half, unit, _)) in enumerate(zip(axes, HALVES, strict=True)):
             parts, total = along_total(shares.values[..., 3 * k : 3 * k + 3])
             up, down = np.maximum(parts, 0), np.minimum(parts, 0)
             if causes:

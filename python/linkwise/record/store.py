@@ -23,12 +23,7 @@ from linkwise.base import AnyArray
 from linkwise.record.claim import check_target, hold, release
 from linkwise.record.machine import write_model
 from linkwise.record.provenance import plain
-from linkwise.record.schema import (
-    TIME_ATTRS,
-    Coordinate,
-    Schema,
-    Variable,
-)
+from linkwise.record.schema import TIME_ATTRS, Coordinate, Schema, Variable
 
 if TYPE_CHECKING:
     import xarray as xr

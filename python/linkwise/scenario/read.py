@@ -18,12 +18,7 @@ from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.files import SCENARIO_BYTES, read_bytes
 from linkwise.io.load import load
 from linkwise.loads.rating import Rating
-from linkwise.scenario.arguments import (
-    ArgumentBuilder,
-    ScenarioSource,
-    key_path,
-    with_inertias,
-)
+from linkwise.scenario.arguments import ArgumentBuilder, ScenarioSource, key_path, with_inertias
 from linkwise.scenario.schema import RatingsFile, ScenarioFile, describe, keys_at
 
 # tomllib takes time quadratic in the parts of a dotted key: minutes for a file of 100 kB.

@@ -28,19 +28,22 @@ class Instances(NamedTuple):
     colors: npt.NDArray[np.uint8]
 
 
+def _between(stops: Array, share: Array) -> Array:
+    """Colours (n, 3) between the stops, the first at share 0 and the last at 1."""
+    at = np.clip(np.nan_to_num(share), 0.0, 1.0) * (len(stops) - 1)
+    low = np.minimum(at.astype(int), len(stops) - 2)
+    mixed: Array = stops[low] + (at - low)[:, None] * (stops[low + 1] - stops[low])
+    return mixed
+
+
 def colors_of(share: Array) -> npt.NDArray[np.uint8]:
     """Colours (n, 3) of magnitudes given as shares of the largest."""
-    at = np.clip(np.nan_to_num(share), 0.0, 1.0) * (len(_STOPS) - 1)
-    low = np.minimum(at.astype(int), len(_STOPS) - 2)
-    mixed = _STOPS[low] + (at - low)[:, None] * (_STOPS[low + 1] - _STOPS[low])
-    return np.asarray(np.rint(mixed), dtype=np.uint8)
+    return np.asarray(np.rint(_between(_STOPS, share)), dtype=np.uint8)
 
 
 def colors_of_use(use: Array) -> npt.NDArray[np.uint8]:
     """Colours (n, 3) of shares of a rating: one step at 1; grey where nothing is rated."""
-    at = np.clip(np.nan_to_num(use), 0.0, 1.0) * (len(_USE_STOPS) - 1)
-    low = np.minimum(at.astype(int), len(_USE_STOPS) - 2)
-    mixed = _USE_STOPS[low] + (at - low)[:, None] * (_USE_STOPS[low + 1] - _USE_STOPS[low])
+    mixed = _between(_USE_STOPS, use)
     mixed[use > 1] = _OVERLOADED
     mixed[np.isnan(use)] = _UNRATED
     return np.asarray(np.rint(mixed), dtype=np.uint8)

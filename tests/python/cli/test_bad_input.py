@@ -140,7 +140,7 @@ def test_control_characters_of_file_names_do_not_reach_the_terminal(linkwise):
 
 
 def test_unforeseen_errors_are_one_line_too(linkwise, monkeypatch):
-    monkeypatch.setattr("linkwise.cli.inspect._load", lambda *_: 1 / 0)
+    monkeypatch.setattr("linkwise.cli.inspect.load_given", lambda *_: 1 / 0)
     result = linkwise("inspect", "x.urdf")
     assert result.code == 1
     assert "ZeroDivisionError" in result.complaint
