@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "linkwise/dynamics/articulated_body.hpp"
 #include "linkwise/dynamics/articulated_paths.hpp"
 #include "linkwise/dynamics/piecewise.hpp"
 

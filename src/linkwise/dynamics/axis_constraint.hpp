@@ -8,7 +8,7 @@
 // so that they may be taken in the frame before the motion. An armature I adds P P^T / I to the
 // compliance, which in this basis is 1/I in the last place.
 #include "linkwise/dynamics/joint_elimination.hpp"
-#include "linkwise/kinematics/axis_frames.hpp"
+#include "linkwise/kinematics/placement.hpp"
 
 namespace linkwise {
 

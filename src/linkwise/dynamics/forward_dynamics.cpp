@@ -1,6 +1,7 @@
 #include "linkwise/dynamics/forward_dynamics.hpp"
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/dynamics/articulated_body.hpp"
 #include "linkwise/dynamics/articulated_paths.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/constraint_elimination.hpp"
@@ -71,11 +72,11 @@ class FusedConstraintForce : public DynamicsMethod {
 
 std::unique_ptr<DynamicsMethod> make_articulated_body(const Model& model,
                                                       const DynamicsOptions& options) {
-  const int threads = checked_threads(options.threads);
+  const Executor executor(checked_threads(options.threads));
   if (paths_fill(model, native_lanes))
-    return std::make_unique<Recursion<ArticulatedPaths<Lanes<native_lanes>>>>(model, threads);
+    return std::make_unique<Recursion<ArticulatedPaths<Lanes<native_lanes>>>>(model, executor);
   auto method = std::make_unique<Recursion<ArticulatedBody<double>>>(model);
-  method->kernel().share_branches(threads);
+  method->kernel().share_branches(executor);
   return method;
 }
 

@@ -1,8 +1,8 @@
 #include "linkwise/dynamics/piecewise.hpp"
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/dynamics/piece_kernels.hpp"
-#include "linkwise/exec/thread_pool.hpp"
+#include "linkwise/exec/executor.hpp"
+#include "linkwise/recursion/piece_group.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
@@ -13,7 +13,9 @@ using Group = Lanes<native_lanes>;
 /// Below, three barriers of a microsecond cost more than a second thread saves.
 constexpr int fewest_for_threads = 128;
 
-int threads_for(int n_bodies, int threads) { return n_bodies < fewest_for_threads ? 1 : threads; }
+Executor executor_for(int n_bodies, int threads) {
+  return n_bodies < fewest_for_threads ? Executor() : Executor(checked_threads(threads));
+}
 
 }  // namespace
 
@@ -21,7 +23,7 @@ class PiecewiseChain {
  public:
   PiecewiseChain(const Model& model, const DynamicsOptions& options)
       : model_(model),
-        threads_(threads_for(model.n_bodies(), checked_threads(options.threads))),
+        executor_(executor_for(model.n_bodies(), options.threads)),
         n_(model.n_bodies()),
         n_pieces_(Piecewise::pieces(n_)),
         length_((n_ + n_pieces_ - 1) / n_pieces_),
@@ -36,28 +38,26 @@ class PiecewiseChain {
     b_.resize(A_.size());
     f_.resize(A_.size());
     for (int g = 0; g < (n_pieces_ + native_lanes - 1) / native_lanes; ++g) {
-      groups_.emplace_back(
-          LaneBodies<Group>(model, length_, [&](int k, int l) { return body_at(g, l, k); }));
+      LaneBodies<Group> bodies(model, length_, [&](int k, int l) { return body_at(g, l, k); });
       // The first body of a piece of stand-ins must have an inertia to invert; nothing feels it.
       for (int l = 0; l < native_lanes; ++l)
         if (body_at(g, l, 0) >= n_)
-          set_lanes<Group>(groups_.back().body[0].inertia, l,
-                           Inertia<double>{1, {}, {{1, 0, 1, 0, 0, 1}}});
+          set_lanes<Group>(bodies[0].inertia, l, RigidBody<double>{1, {}, {{1, 0, 1, 0, 0, 1}}});
+      groups_.emplace_back(std::move(bodies));
     }
   }
 
   DynamicsReport evaluate(const SweepInput<double>& in, double* du, double* loads) {
     in_ = &in;
-    parallel_for(n_groups(), threads_, [&](int g) {
+    executor_.for_each(n_groups(), [&](int g) {
       groups_[g].across([&](int k) { return gather(in.q, g, k); },
                         [&](int k) { return in.v ? gather(in.v, g, k) : Group{}; });
     });
     scan_velocities();
-    parallel_for(n_groups(), threads_, [&](int g) {
-      groups_[g].velocities();
+    executor_.for_each(n_groups(), [&](int g) {
+      groups_[g].calc_velocities();
       add_external(g);
-      for (int k = 0; k < length_; ++k) groups_[g].state[k].torque = gather(in.tau, g, k);
-      groups_[g].tip_to_base();
+      groups_[g].eliminate_joints([&](int k) { return gather(in.tau, g, k); });
     });
     assemble();
     DynamicsReport report{solver_->solve(A_, b_, f_)};
@@ -68,8 +68,8 @@ class PiecewiseChain {
       return report;
     }
     spread_forces();
-    parallel_for(n_groups(), threads_, [&](int g) {
-      groups_[g].base_to_tip(
+    executor_.for_each(n_groups(), [&](int g) {
+      groups_[g].accelerate_bodies(
           [&](int k, Group rate) {
             for (int l = 0; l < native_lanes; ++l)
               if (const int n = body_at(g, l, k); n < n_) du[n] = rate[l];
@@ -104,9 +104,8 @@ class PiecewiseChain {
       for (int k = 0; k < length_; ++k) {
         const int n = body_at(g, l, k);
         if (n >= n_) return;
-        Force<double> p = get_lanes<Force<double>, Group>(groups_[g].state[k].p, l);
-        p -= user_wrench(in_->external, model_.joints[n], n);
-        set_lanes<Group>(groups_[g].state[k].p, l, p);
+        const Force<double> w = user_wrench(in_->external, model_.joints[n], n);
+        groups_[g].add_wrench(k, l, {-w.lin, -w.ang});
       }
   }
 
@@ -172,8 +171,8 @@ class PiecewiseChain {
         for (int j = 0; j < cut_rows; ++j)
           A_.diag[s][block_stride * i + j] =
               e.QJQ[sym_index(i, j)][l] + (in ? in->PsiJPsi[sym_index(i, j)][li] : 0);
-        b_[cut_rows * s + i] = component(bias_[s], i) - component(free, i) +
-                               (in ? in->beta[i][li] : component(from_ground, i));
+        b_[cut_rows * s + i] = to_array(bias_[s])[i] - to_array(free)[i] +
+                               (in ? in->beta[i][li] : to_array(from_ground)[i]);
         if (in)
           for (int j = 0; j < cut_rows; ++j)
             A_.parent_block[s][block_stride * i + j] = -in->PsiJQ[5 * i + j][li];
@@ -205,13 +204,13 @@ class PiecewiseChain {
       for (int k = 0; k < length_; ++k) {
         const int n = body_at(g, l, k);  // and the number of its joint
         if (n >= n_) return;
-        store_joint_load(model_, n, in_->q,
-                         get_lanes<Force<double>, Group>(groups_[g].state[k].U, l), loads + 6 * n);
+        store_joint_load(model_, n, in_->q, groups_[g].joint_load(k, l), loads + 6 * n);
       }
   }
 
   const Model& model_;
-  int threads_, n_, n_pieces_, length_;
+  Executor executor_;
+  int n_, n_pieces_, length_;
   std::vector<PieceGroup<Group>> groups_;
   std::vector<Transform<double>> pose_;  ///< across the cut joints
   std::vector<Motion<double>> bias_;     ///< c of the cut joints

@@ -41,7 +41,9 @@ struct SweepInput {
 
 /// Calls f(joint, begin, end) for every range of bodies with equal joints; joint is one of the
 /// structs of axis_joints.hpp or GeneralJoint. One dispatch per range, none per body.
-struct GeneralJoint {};
+struct GeneralJoint {
+  static constexpr bool is_hinge = false, leaves_zero_row = false;
+};
 template <class F>
 LW_INLINE void dispatch_kind_range(const KindRange& range, F&& f) {
   switch (range.kind) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "dynamics/dynamics_case.hpp"
+#include "linkwise/dynamics/articulated_body.hpp"
 #include "linkwise/dynamics/articulated_paths.hpp"
 
 namespace linkwise::testing {
@@ -125,10 +126,10 @@ TEST_P(PathThreads, AsBodyByBody) {
 TEST_P(PathThreads, SameBits) {
   const Model model = model_of(GetParam());
   const DynamicsCase c(model, 4);
-  ArticulatedPaths<Lanes<2>> one(model, 1);
+  ArticulatedPaths<Lanes<2>> one(model, Executor(1));
   const Motion6 want = run(one, model, c.input());
   for (const int threads : {2, 3, 7}) {
-    ArticulatedPaths<Lanes<2>> several(model, threads);
+    ArticulatedPaths<Lanes<2>> several(model, Executor(threads));
     const Motion6 got = run(several, model, c.input());
     EXPECT_EQ(got.du, want.du) << threads << " threads";
     EXPECT_EQ(got.loads, want.loads) << threads << " threads";

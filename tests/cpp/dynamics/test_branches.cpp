@@ -55,7 +55,7 @@ TEST_P(BranchThreads, SameBitsAndTheUncutRecursion) {
   const DynamicsCase c(model, 9);
   const auto run = [&](int threads) {
     ArticulatedBody<double> method(model);
-    if (threads > 0) method.share_branches(threads);
+    if (threads > 0) method.share_branches(Executor(threads));
     Motion6 out{std::vector<double>(model.nv()), std::vector<double>(6 * model.n_joints())};
     std::vector<double> without_loads(model.nv());
     EXPECT_TRUE(method.evaluate(c.input(), out.du.data(), out.loads.data()));

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "linkwise/joints/axis_joints.hpp"
-#include "linkwise/kinematics/axis_frames.hpp"
+#include "linkwise/kinematics/placement.hpp"
 #include "linkwise/simd/lanes.hpp"
 #include "linkwise/spatial/hinge.hpp"
 
@@ -80,28 +80,36 @@ class LaneBodies {
   LW_INLINE void turn_to(int k, S q, LaneTurn<S>& turn) const {
     sincos(S(q + body_[k].theta), turn.sine, turn.cosine);
   }
-  LW_INLINE Motion<S> seen_at_child(int k, const LaneTurn<S>& t, const Motion<S>& v) const {
-    const LaneBody<S>& b = body_[k];
-    return b.skew < 0 ? to_child(b.placement, t.cosine, t.sine, v) : pose(k, t) * v;
-  }
-  LW_INLINE Force<S> seen_at_parent(int k, const LaneTurn<S>& t, const Force<S>& f) const {
-    const LaneBody<S>& b = body_[k];
-    return b.skew < 0 ? to_parent(b.placement, t.cosine, t.sine, f)
-                      : transpose_times(pose(k, t), f);
-  }
-  LW_INLINE ArticulatedInertia<S> seen_at_parent(int k, const LaneTurn<S>& t,
-                                                 const PlanarInertia<S>& Z) const {
-    const LaneBody<S>& b = body_[k];
-    return b.skew < 0 ? to_parent(b.placement, t.cosine, t.sine, Z)
-                      : transform_to_parent(pose(k, t), Z);
-  }
-  LW_INLINE Transform<S> pose(int k, const LaneTurn<S>& t) const {
-    const LaneBody<S>& b = body_[k];
-    if (b.skew >= 0) return {turn_about_z(skew_[b.skew].R, t.cosine, t.sine), skew_[b.skew].r};
-    const S c = t.cosine, n = t.sine, ca = b.placement.cos_alpha, sa = b.placement.sin_alpha;
-    return {{{c, n * ca, n * sa, -n, c * ca, c * sa, S{}, -sa, ca}},
-            {b.placement.a, -b.placement.d * sa, b.placement.d * ca}};
-  }
+  /// The placement of position k (kinematics/placement.hpp).
+  struct Place {
+    const LaneBodies& all;
+    int k;
+    const LaneTurn<S>& turn;
+
+    LW_INLINE Motion<S> to_child(const Motion<S>& v) const {
+      const LaneBody<S>& b = all.body_[k];
+      return b.skew < 0 ? linkwise::to_child(b.placement, turn.cosine, turn.sine, v) : pose() * v;
+    }
+    LW_INLINE Force<S> to_parent(const Force<S>& f) const {
+      const LaneBody<S>& b = all.body_[k];
+      return b.skew < 0 ? linkwise::to_parent(b.placement, turn.cosine, turn.sine, f)
+                        : transpose_times(pose(), f);
+    }
+    LW_INLINE ArticulatedInertia<S> to_parent(const PlanarInertia<S>& Y) const {
+      const LaneBody<S>& b = all.body_[k];
+      return b.skew < 0 ? linkwise::to_parent(b.placement, turn.cosine, turn.sine, Y)
+                        : transform_to_parent(pose(), Y);
+    }
+    LW_INLINE Transform<S> pose() const {
+      const LaneBody<S>& b = all.body_[k];
+      const S c = turn.cosine, s = turn.sine;
+      if (b.skew >= 0) return {turn_about_z(all.skew_[b.skew].R, c, s), all.skew_[b.skew].r};
+      const S ca = b.placement.cos_alpha, sa = b.placement.sin_alpha;
+      return {{{c, s * ca, s * sa, -s, c * ca, c * sa, S{}, -sa, ca}},
+              {b.placement.a, -b.placement.d * sa, b.placement.d * ca}};
+    }
+  };
+  LW_INLINE Place place(int k, const LaneTurn<S>& turn) const { return {*this, k, turn}; }
 
  private:
   void set_body(const Model& model, int n, int k, int l) {

@@ -1,6 +1,7 @@
 #pragma once
-// Across a joint of one axis in two steps: from the parent's frame to the joint's by constants of
-// the model, then its motion about and along z. Sweeps that never need the product of both skip it.
+// How a body sits on its parent at one instant. Every placement answers the same three questions,
+//     to_child(v) = X v,    to_parent(f) = X^T f,    to_parent(Y) = X^T Y X,
+// so that a step is written once, whatever the joint and wherever X is kept.
 #include "linkwise/model/model.hpp"
 #include "linkwise/spatial/matrix6.hpp"
 
@@ -9,6 +10,39 @@ namespace linkwise {
 inline HingePlacement<double> placement(const BodyConstants<double>& k) {
   return {k.cos_alpha, k.sin_alpha, k.a, k.d};
 }
+
+/// A hinge: four constants and the turn about z.
+template <class C, class S>
+struct TurnedHinge {
+  HingePlacement<C> constants;
+  S cosine, sine;
+
+  LW_INLINE Motion<S> to_child(const Motion<S>& v) const {
+    return linkwise::to_child(constants, cosine, sine, v);
+  }
+  LW_INLINE Force<S> to_parent(const Force<S>& f) const {
+    return linkwise::to_parent(constants, cosine, sine, f);
+  }
+  LW_INLINE ArticulatedInertia<S> to_parent(const PlanarInertia<S>& Y) const {
+    return linkwise::to_parent(constants, cosine, sine, Y);
+  }
+};
+
+/// Any joint: the whole transform.
+template <class S>
+struct Pose {
+  const Transform<S>& X;
+
+  LW_INLINE Motion<S> to_child(const Motion<S>& v) const { return X * v; }
+  LW_INLINE Force<S> to_parent(const Force<S>& f) const { return transpose_times(X, f); }
+  template <class Y>
+  LW_INLINE ArticulatedInertia<S> to_parent(const Y& inertia) const {
+    return transform_to_parent(X, inertia);
+  }
+};
+
+// Across a joint of one axis in two steps: from the parent's frame to the joint's by constants of
+// the model, then its motion about and along z. Sweeps that never need the product of both skip it.
 
 /// How far a joint of one axis has moved; what its kind does not move is not read.
 template <class S>

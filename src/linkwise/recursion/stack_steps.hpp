@@ -1,0 +1,139 @@
+#pragma once
+// The steps of steps.hpp for joints of several axes or none, the stacks of elements: U and P are up
+// to six columns and D is a matrix, kept as its Cholesky factor. A floating joint without rotors
+// has P = 1; its steps are last.
+#include "linkwise/kinematics/body_state.hpp"
+#include "linkwise/recursion/steps.hpp"
+#include "linkwise/recursion/tolerances.hpp"
+#include "linkwise/spatial/matrix6.hpp"
+
+namespace linkwise {
+
+/// A joint of several axes, eliminated.
+template <class S>
+struct EliminatedStack {
+  Force<S> U[6];  ///< Y P
+  S L[36];        ///< of D = L L^T by rows, the diagonal as its reciprocal
+  S u[6];         ///< tau - P^T p
+};
+
+/// U, D and u, as of one axis. tau and armature are those of all joints. False where D is not
+/// positive definite.
+template <class S>
+LW_INLINE bool eliminate(const GeneralState<S>& joint, const ArticulatedInertia<S>& Y,
+                         const Force<S>& p, const double* armature, const S* tau,
+                         EliminatedStack<S>& out) {
+  bool positive = true;
+  for (int i = 0; i < joint.n; ++i) out.U[i] = Y * joint.P[i];
+  for (int i = 0; i < joint.n; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      S d = dot(joint.P[i], out.U[j]);
+      if (i == j) d = d + armature[joint.dof[i]];
+      const S whole = d;
+      for (int l = 0; l < j; ++l) d = d - out.L[6 * i + l] * out.L[6 * j + l];
+      if (i == j) {
+        positive &= is_positive(S(d - smallest_pivot * whole));
+        out.L[7 * i] = 1.0 / square_root(d);
+      } else {
+        out.L[6 * i + j] = d * out.L[7 * j];
+      }
+    }
+    out.u[i] = tau[joint.dof[i]] - dot(joint.P[i], p);
+  }
+  return positive;
+}
+
+/// Ya and pa in the places of Y and p.
+template <class S>
+LW_INLINE void reduce(int n_columns, const EliminatedStack<S>& stack, const Motion<S>& c,
+                      ArticulatedInertia<S>& Y, Force<S>& p) {
+  // W = U L^-T, so that U D^-1 U^T = W W^T and U D^-1 u = W (L^-1 u).
+  Force<S> W[6];
+  S z[6];
+  for (int i = 0; i < n_columns; ++i) {
+    Force<S> column = stack.U[i];
+    S y = stack.u[i];
+    for (int l = 0; l < i; ++l) {
+      column -= Force<S>{stack.L[6 * i + l] * W[l].lin, stack.L[6 * i + l] * W[l].ang};
+      y = y - stack.L[6 * i + l] * z[l];
+    }
+    const S r = stack.L[7 * i];
+    W[i] = {r * column.lin, r * column.ang};
+    z[i] = r * y;
+    subtract_outer(Y, W[i], W[i]);
+  }
+  p += Y * c;
+  for (int i = 0; i < n_columns; ++i) p += Force<S>{z[i] * W[i].lin, z[i] * W[i].ang};
+}
+
+/// D^-1 y in the place of y.
+template <class S>
+LW_INLINE void solve_stack(int n_columns, const S* L, S* y) {
+  for (int i = 0; i < n_columns; ++i) {
+    for (int l = 0; l < i; ++l) y[i] = y[i] - L[6 * i + l] * y[l];
+    y[i] = y[i] * L[7 * i];
+  }
+  for (int i = n_columns - 1; i >= 0; --i) {
+    for (int l = i + 1; l < n_columns; ++l) y[i] = y[i] - L[6 * l + i] * y[l];
+    y[i] = y[i] * L[7 * i];
+  }
+}
+
+/// u and pa, in the place of p, for another right-hand side.
+template <class S>
+LW_INLINE void respond(const GeneralState<S>& joint, const ArticulatedInertia<S>& Ya,
+                       const Motion<S>& c, const S* tau, EliminatedStack<S>& stack, Force<S>& p) {
+  S y[6];
+  for (int i = 0; i < joint.n; ++i) y[i] = stack.u[i] = tau[joint.dof[i]] - dot(joint.P[i], p);
+  solve_stack(joint.n, stack.L, y);
+  p += Ya * c;
+  for (int i = 0; i < joint.n; ++i) p += Force<S>{y[i] * stack.U[i].lin, y[i] * stack.U[i].ang};
+}
+
+/// The joint's accelerations into du; a = X a_p becomes the body's own.
+template <class S>
+LW_INLINE void accelerate(const GeneralState<S>& joint, const EliminatedStack<S>& stack,
+                          const Motion<S>& c, Motion<S>& a, S* du) {
+  a += c;
+  S y[6];
+  for (int i = 0; i < joint.n; ++i) y[i] = stack.u[i] - dot(a, stack.U[i]);
+  solve_stack(joint.n, stack.L, y);
+  for (int i = 0; i < joint.n; ++i) {
+    du[joint.dof[i]] = y[i];
+    a += Motion<S>{y[i] * joint.P[i].lin, y[i] * joint.P[i].ang};
+  }
+}
+
+/// A floating joint without rotors: D = Y, and the parent feels nothing but the joint's own forces.
+template <class S>
+struct EliminatedFree {
+  S L[21];      ///< Cholesky factor of Y
+  Motion<S> a;  ///< acceleration of the body, Y^-1 (tau - p)
+};
+
+template <class S>
+LW_INLINE void respond(const Force<S>& p, const Force<S>& tau, EliminatedFree<S>& out) {
+  Force<S> f = tau;
+  f -= p;
+  out.a = solve(out.L, f);
+}
+
+/// False where Y is not positive definite.
+template <class S>
+LW_INLINE bool eliminate(const ArticulatedInertia<S>& Y, const Force<S>& p, const Force<S>& tau,
+                         EliminatedFree<S>& out) {
+  const bool positive = factor(Y, out.L, smallest_pivot);
+  respond(p, tau, out);
+  return positive;
+}
+
+/// The joint's six accelerations into du; a = X a_p becomes the body's own.
+template <class S>
+LW_INLINE void accelerate(const EliminatedFree<S>& free, const Motion<S>& c, Motion<S>& a, S* du) {
+  a += c;
+  const Vector6<S> carried = to_array(a), whole = to_array(free.a);
+  for (int i = 0; i < 6; ++i) du[i] = whole[i] - carried[i];
+  a = free.a;
+}
+
+}  // namespace linkwise
