@@ -1,4 +1,4 @@
-"""What every room uses: the type of arrays, runs cut into blocks, and values as JSON has them."""
+"""What every room uses: arrays, a wrench's components, blocks of runs, values as JSON has them."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 AnyArray = npt.NDArray[Any]
+
+# A wrench is a force and a moment; these are its components in the order of every array.
+COMPONENTS = ("fx", "fy", "fz", "nx", "ny", "nz")
+HALVES = (("force", "N", COMPONENTS[:3]), ("moment", "N m", COMPONENTS[3:]))
 
 # What is held of a run at once, in bytes: the run itself may be larger than memory.
 BLOCK_BYTES = 64 << 20

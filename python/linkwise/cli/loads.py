@@ -265,14 +265,15 @@ def _all_joints(records: list[dict[str, Any]]) -> Any:
 
 
 def _joint_table(records: list[dict[str, Any]], joint: str) -> Any:
-    components = ("fx", "fy", "fz", "nx", "ny", "nz")
-    headings = ["peak", "at [s]", "rms", "minimum", "maximum", "duty", *components]
+    from linkwise.base import COMPONENTS
+
+    headings = ["peak", "at [s]", "rms", "minimum", "maximum", "duty", *COMPONENTS]
     columns = [("quantity", "left"), *((name, "right") for name in headings)]
     result = table(f"Load of {text(joint)}; fx ... nz at the time of each peak", columns)
     for record in records:
         if record["joint"] != joint:
             continue
-        keys = ("peak_time", "rms", "minimum", "maximum", "duty", *components)
+        keys = ("peak_time", "rms", "minimum", "maximum", "duty", *COMPONENTS)
         result.add_row(
             f"{record['quantity'].replace('_', ' ')} [{record['unit']}]",
             _with_bound(record),

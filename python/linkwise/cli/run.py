@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +21,8 @@ from linkwise.cli.output import (
 
 if TYPE_CHECKING:
     from linkwise.results import Run
+
+_MOST_NAMED = 4  # joints beyond their limits
 
 
 def run(
@@ -78,7 +81,7 @@ def _solver(name: str) -> str:
 
 def show_run(run: Run, as_json: bool) -> None:
     """How the run went, the peak loads, and where the results are."""
-    from linkwise.cli.limits import beyond_limits, limit_note
+    from linkwise.loads.limits import beyond_limits
 
     peaks = peak_records(run) if has_loads(run) else []
     beyond = beyond_limits(run) if run.dataset.sizes["time"] else []
@@ -96,5 +99,20 @@ def show_run(run: Run, as_json: bool) -> None:
         markup=False,
     )
     if beyond:
-        screen.print(limit_note(beyond), markup=False)
+        screen.print(_limit_note(beyond), markup=False)
     screen.print(f"Results: {run.path}", markup=False)
+
+
+def _limit_note(beyond: Sequence[Mapping[str, Any]]) -> str:
+    """One sentence about what `beyond_limits` found, and what to do about it."""
+    said = [
+        f"{joint['joint']} ({number(joint['lower'])} .. {number(joint['upper'])}) gets to "
+        f"{number(joint['farthest'])}, outside from {number(joint['since'])} s"
+        for joint in beyond[:_MOST_NAMED]
+    ]
+    if len(beyond) > _MOST_NAMED:
+        said.append(f"and {len(beyond) - _MOST_NAMED} more")
+    return (
+        f"Beyond their limits, which exert no force: {'; '.join(said)}. "
+        "Drive or lock such joints, or give them stops (limit_stiffness)."
+    )

@@ -66,15 +66,17 @@ def member_records(found: xr.Dataset, keys: list[str]) -> list[dict[str, Any]]:
     """Per member its values, how it went, and the largest force and moment and where."""
     import numpy as np
 
+    from linkwise.base import HALVES
+
     records = []
     for k in range(found.sizes["member"]):
         member = found.isel(member=k)
         record: dict[str, Any] = {key: member[key].values.tolist() for key in keys}
         record["outcome"] = str(member["outcome"].values)
-        for half, components in (("force", ["fx", "fy", "fz"]), ("moment", ["nx", "ny", "nz"])):
+        for half, _, components in HALVES:
             if "joint_load" not in found:
                 continue
-            load = member["joint_load"].sel(component=components)
+            load = member["joint_load"].sel(component=list(components))
             size = np.linalg.norm(load.transpose("time", "joint", "component").values, axis=-1)
             at = np.unravel_index(int(np.nanargmax(size)), size.shape)
             record |= {

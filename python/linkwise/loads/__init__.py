@@ -1,4 +1,4 @@
-"""What a designer reads off a run: loads in any frame, by cause, with bounds, ratings, reports.
+"""What a designer reads off a run: loads in any frame, by cause, with bounds, against ratings.
 
 Everything takes a `Run` and returns xarray objects whose attributes state units, frames and signs.
 The run must hold `joint_load`; what else a function needs is in its docstring.

@@ -106,10 +106,9 @@ class Split:
     ) -> Array:
         torque = np.where(self.imposed, 0.0, rows(self.run, "drive_torque", where))
         held = rows(self.run, "acceleration", where) if "motion" in self.names else None
-        shares = _core.joint_loads_by_cause(
+        return _core.joint_loads_by_cause(
             self.free, self.names, q, v, torque, external=outside, prescribed=held
         )
-        return np.asarray(shares)
 
     def _by_motion(
         self, q: Array, v: Array, outside: Array | None, where: slice | Sequence[int]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise._core import InputError
-from linkwise.base import Array
+from linkwise.base import COMPONENTS, Array
 from linkwise.loads.engineering import QUANTITIES, derive, drive_power, has_power, joint_directions
 from linkwise.results.samples import (
     joint_names,
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from linkwise._core import Model
     from linkwise.results import Run
 
-COMPONENTS = ("fx", "fy", "fz", "nx", "ny", "nz")
 # Slopes of Woehler lines: welded steel, steel, cast iron and composites.
 EXPONENTS = (3.0, 5.0, 10.0)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.base import Array
+from linkwise.base import HALVES, Array
 from linkwise.loads.engineering import QUANTITIES, derived_rows, has_power, joint_directions
 from linkwise.results.samples import (
     blocks,
@@ -202,7 +202,7 @@ def peak_loads(run: Run) -> xr.Dataset:
         largest[better] = peak[better]
         when[better] = times[where.start + at.T][better]
     data = {}
-    for k, (name, units) in enumerate((("force", "N"), ("moment", "N m"))):
+    for k, (name, units, _) in enumerate(HALVES):
         attrs = {"long_name": f"largest joint {name}", "units": units}
         data[name] = ("joint", largest[k], attrs)
         at_attrs = {"long_name": f"time of the largest joint {name}", "units": "s"}

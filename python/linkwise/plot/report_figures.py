@@ -15,11 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
-from linkwise.base import Array
+from linkwise.base import HALVES, Array
 from linkwise.loads.causes import Split, along_total
 from linkwise.loads.engineering import derive, joint_directions
 from linkwise.loads.fatigue import load_duration, spectrum
-from linkwise.plot.run_figures import HALVES
 from linkwise.results.samples import blocks, joint_names, model_of, rows, select
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.base import HALVES
 from linkwise.loads.causes import along_total, split
 from linkwise.loads.energy import energy_balance
 from linkwise.results.samples import joint_position
@@ -14,8 +15,6 @@ from linkwise.results.samples import joint_position
 if TYPE_CHECKING:
     from linkwise.loads.causes import By
     from linkwise.results import Run
-
-HALVES = (("force", "N", ("fx", "fy", "fz")), ("moment", "N m", ("nx", "ny", "nz")))
 
 
 def _figure(rows: int) -> tuple[Any, Any]:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
-from linkwise.base import AnyArray
+from linkwise.base import COMPONENTS, AnyArray
 from linkwise.record.labels import Scalars, joint_scalars, text_array
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ QUANTITIES = (
     "energy",
     "statistics",
 )
-COMPONENTS = ("fx", "fy", "fz", "nx", "ny", "nz")
 
 _LOAD_ATTRS = {
     "long_name": "joint load",

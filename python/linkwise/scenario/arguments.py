@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from linkwise import drives
 from linkwise._core import InputError, Model, integrators, methods, solvers
+from linkwise.base import COMPONENTS
 from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.table import CsvTable, read_table
 from linkwise.io.units import check_dimension
@@ -35,7 +36,6 @@ from linkwise.scenario.schema import (
 
 _D = TypeVar("_D", bound=drives.Drive)
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+\Z")
-_WRENCH_COLUMNS = ("fx", "fy", "fz", "nx", "ny", "nz")
 # Dimension of a quantity along an angle and along a length.
 _KINDS = {
     "position": ("angle", "length"),
@@ -230,7 +230,7 @@ class ArgumentBuilder:
             zero = [Quantity(0.0, None)] * 3
             parts = [*(section.force or zero), *(section.moment or zero)]
             return drives.Wrench([p.value for p in parts], section.frame)
-        names = section.columns or _WRENCH_COLUMNS
+        names = section.columns or COMPONENTS
         units = ["m", "m", "m", "rad", "rad", "rad"]
         table = self._table(section.table, names, units, section.interpolation, keys, "torque")
         return drives.Wrench(table, section.frame)

@@ -145,7 +145,7 @@ def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
     A body is named after one of its links, whose frame is the joint's in most files: two frames of
     one rigid body that agree in one position agree in all.
     """
-    links, joints = np.asarray(_core.link_poses(model, q)), np.asarray(_core.body_poses(model, q))
+    links, joints = _core.link_poses(model, q), _core.body_poses(model, q)
     index = {name: k for k, name in enumerate(model.link_names)}
     found = np.full(len(links), -1)
     for joint, body in enumerate(model.body_names):
@@ -157,8 +157,8 @@ def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
 
 
 def _poses(model: Model, q: Array, link_poses: npt.NDArray[np.int64]) -> Array:
-    links = np.asarray(_core.link_poses(model, q))[link_poses >= model.n_joints]
-    frames = np.concatenate([np.asarray(_core.body_poses(model, q)), links])
+    links = _core.link_poses(model, q)[link_poses >= model.n_joints]
+    frames = np.concatenate([_core.body_poses(model, q), links])
     return np.concatenate([frames[:, :3, 3], quaternions(frames[:, :3, :3])], axis=1)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.base import Array
+from linkwise.base import HALVES, Array
 
 if TYPE_CHECKING:
     import viser
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 MOST_SAMPLES = 500
 COLORS = ("#30363d", "#c0392b", "#2e8b57", "#2f6fb7")
-HALVES = (("Force [N]", ("fx", "fy", "fz")), ("Moment [N m]", ("nx", "ny", "nz")))
 
 
 class LoadPlot:
@@ -28,7 +27,7 @@ class LoadPlot:
         self._dot = -1
         self._plots: list[Any] = []
         blank = np.zeros(2)
-        for title, labels in HALVES:
+        for half, unit, labels in HALVES:
             names = ("size", *labels)
             series: list[Any] = [{"label": "t [s]"}]
             for name, color in zip(names, COLORS, strict=True):
@@ -41,7 +40,7 @@ class LoadPlot:
                 server.gui.add_uplot(
                     (blank,) * 6,
                     tuple(series),
-                    title=title,
+                    title=f"{half.capitalize()} [{unit}]",
                     scales={"x": {"time": False}},
                     height=190,
                 )

@@ -100,8 +100,8 @@ class Scene:
     # -- snapshots ----------------------------------------------------------------------------
 
     def at(self, q: Array, loads: Array | None) -> Snapshot:
-        links = np.asarray(_core.link_poses(self._model, q))
-        return Snapshot(links, np.asarray(_core.body_poses(self._model, q)), loads)
+        links = _core.link_poses(self._model, q)
+        return Snapshot(links, _core.body_poses(self._model, q), loads)
 
     def show(self, snapshot: Snapshot) -> None:
         self._snapshot = snapshot

@@ -138,7 +138,7 @@ class Source:
 def static_loads(model: Model, q: Array) -> Array:
     """Loads (n_joints, 6) while the machine is held still in the pose q."""
     rest = np.zeros(model.nv)
-    return np.asarray(inverse_dynamics_loads(model, q, rest, rest))
+    return inverse_dynamics_loads(model, q, rest, rest)
 
 
 def open_source(target: PathLike, options: Options) -> Source:

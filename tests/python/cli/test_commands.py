@@ -8,8 +8,8 @@ import pytest
 
 import linkwise as lw
 from linkwise.cli import demo
-from linkwise.cli.limits import beyond_limits
 from linkwise.cli.progress import describe
+from linkwise.loads.limits import beyond_limits
 from linkwise.simulation.time_loop import Progress
 
 # -- demo ----------------------------------------------------------------------------------------

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.cli.output import number
+from linkwise.base import Array
 from linkwise.results.samples import blocks, rows
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from linkwise._core import Model
     from linkwise.results import Run
-
-_SHOWN = 4
 
 
 def _limited(run: Run, model: Model) -> list[tuple[str, int, float, float]]:
@@ -48,7 +43,7 @@ def beyond_limits(run: Run) -> list[dict[str, Any]]:
     lower, upper = np.array([row[2:] for row in limited]).T
     since, farthest = np.full((2, len(limited)), np.nan)
     worst = np.zeros(len(limited))
-    times: npt.NDArray[np.float64] = run.dataset["time"].values
+    times: Array = run.dataset["time"].values
     for where in blocks(run, 8 * run.dataset["position"].shape[1]):
         q = rows(run, "position", where)[:, columns]
         past = np.maximum(lower - q, q - upper)
@@ -67,18 +62,3 @@ def beyond_limits(run: Run) -> list[dict[str, Any]]:
         }
         for k in np.flatnonzero(worst > 0)
     ]
-
-
-def limit_note(beyond: Sequence[Mapping[str, Any]]) -> str:
-    """One sentence about what `beyond_limits` found, and what to do about it."""
-    said = [
-        f"{joint['joint']} ({number(joint['lower'])} .. {number(joint['upper'])}) gets to "
-        f"{number(joint['farthest'])}, outside from {number(joint['since'])} s"
-        for joint in beyond[:_SHOWN]
-    ]
-    if len(beyond) > _SHOWN:
-        said.append(f"and {len(beyond) - _SHOWN} more")
-    return (
-        f"Beyond their limits, which exert no force: {'; '.join(said)}. "
-        "Drive or lock such joints, or give them stops (limit_stiffness)."
-    )
