@@ -56,7 +56,7 @@ def system(kind: str, pose: str, n: int, seed: int) -> lw.ConstraintSystem:
             q = angles[:, 0].copy()
     v, tau = rng.standard_normal(model.nv), rng.standard_normal(model.nv)
     # Without them a planar chain moves in its plane, and the slowest modes, out of it, stay hidden.
-    wrenches = rng.standard_normal((model.n_bodies, 6))
+    wrenches = rng.standard_normal((model.n_joints, 6))
     return lw.ConstraintSystem(model, q, v, tau, external=wrenches)
 
 

@@ -318,7 +318,7 @@ void bind_dynamics(nb::module_& m) {
       "gravity"_a = 1.0, "prescribed"_a = nb::none(),
       "Accelerations dv/dt (..., nv) [rad/s2, m/s2] of q (..., nq), v (..., nv), tau (..., nv); "
       "leading axes broadcast.\n\n"
-      "external (..., n_bodies, 6): wrench [N, N m] on each body at its joint frame's origin, in "
+      "external (..., n_joints, 6): wrench [N, N m] on each body at its joint frame's origin, in "
       "that frame, force\n"
       "first. passive adds the model's damping, friction, springs and stops to tau. method and "
       "solver: names as in\n"

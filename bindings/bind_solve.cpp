@@ -380,7 +380,7 @@ void bind_system(nb::module_& m) {
       .def(nb::init<const PyModel&, nb::handle, nb::handle, nb::handle, nb::handle, bool>(),
            "model"_a, "q"_a, "v"_a = nb::none(), "tau"_a = nb::none(), nb::kw_only(),
            "external"_a = nb::none(), "passive"_a = false,
-           "q (nq,), v (nv,), tau (nv,), external (n_bodies, 6) as in forward_dynamics.")
+           "q (nq,), v (nv,), tau (nv,), external (n_joints, 6) as in forward_dynamics.")
       .def_prop_ro("size", [](const PyConstraintSystem& s) { return s.A().size(); })
       .def_prop_ro("b", &PyConstraintSystem::right_hand_side, nb::rv_policy::move,
                    "Right-hand side (size,).")

@@ -15,6 +15,7 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
   m.attr("lanes") = LINKWISE_LANES;
   nb::exception<linkwise::InputError>(m, "InputError", PyExc_ValueError).attr("__module__") =
       "linkwise";
+  linkwise::bindings::bind_builder(m);
   linkwise::bindings::bind_model(m);
   linkwise::bindings::bind_dynamics(m);
   linkwise::bindings::bind_causes(m);

@@ -18,7 +18,7 @@ from import_graph import SUFFIXES, arrows, circles, import_graph, include_graph,
 #: dynamics: solve never sees a mechanism, constraint fills the systems of linear without solving.
 BASE = {"base", "simd"}
 NUMERICS = BASE | {"exec", "linear", "solve"}
-MOTION = BASE | {"spatial", "bodies", "joints", "model", "kinematics"}
+MOTION = BASE | {"spatial", "bodies", "joints", "graph", "model", "kinematics"}
 MECHANICS = MOTION | {"forces", "constraint"}
 LAYERS = {
     "base": set(),
@@ -29,7 +29,8 @@ LAYERS = {
     "spatial": BASE,
     "joints": BASE | {"spatial"},
     "bodies": BASE | {"spatial", "joints"},
-    "model": BASE | {"spatial", "joints", "bodies"},
+    "graph": {"base"},
+    "model": BASE | {"spatial", "joints", "bodies", "graph"},
     "kinematics": MOTION,
     "forces": MOTION,
     "constraint": MOTION | {"exec", "linear", "forces"},

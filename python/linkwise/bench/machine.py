@@ -49,7 +49,7 @@ class Machine:
 
     @property
     def n_bodies(self) -> int:
-        return int(self.model.n_bodies)
+        return int(self.model.n_joints)  # peers count a moving link without mass as well
 
     @property
     def floating(self) -> bool:

@@ -54,7 +54,7 @@ void CompositeRigidBody::calc_columns(const double* q) {
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int n = model.n_bodies() - 1; n >= 0; --n) {
     const int parent = model.topology[n].parent;
-    if (parent >= 0) add_to_parent(state_[n].X, composite_[n], composite_[parent]);
+    if (parent >= 0) composite_[parent] += transform_to_parent(state_[n].X, composite_[n]);
     Motion<double> P[6], Pa[6];
     int dof[6], dof_a[6];
     const int n_own = body_columns(model, n, general_, P, dof);

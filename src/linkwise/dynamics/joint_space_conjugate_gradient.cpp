@@ -37,7 +37,7 @@ bool JointSpaceConjugateGradient::calc_diagonal() {
       inverse_diagonal_[k] = 1 / H;
     }
     const int parent = model.topology[n].parent;
-    if (parent >= 0) add_to_parent(columns_.state(n).X, composite_[n], composite_[parent]);
+    if (parent >= 0) composite_[parent] += transform_to_parent(columns_.state(n).X, composite_[n]);
   }
   return true;
 }

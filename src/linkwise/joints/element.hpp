@@ -18,6 +18,26 @@ enum class ElementKind : std::uint8_t {
   floating
 };
 
+/// What a kind has.
+struct ElementKindInfo {
+  int nq, nv;
+  int quaternion;    ///< where in its coordinates x, y, z, w of a quaternion start, -1: none
+  const char* axis;  ///< what its axis is called, null where it has none
+  const char *q_units, *v_units;  ///< of its coordinates, and of the integrals of its rates
+};
+inline constexpr ElementKindInfo element_kind_table[] = {
+    {0, 0, -1, nullptr, "", ""},                               // fixed
+    {1, 1, -1, "revolute", "rad", "rad"},                      // revolute
+    {1, 1, -1, "prismatic", "m", "m"},                         // prismatic
+    {1, 1, -1, "helical", "rad", "rad"},                       // helical
+    {4, 3, 0, nullptr, "1 1 1 1", "rad rad rad"},              // spherical
+    {3, 3, -1, "normal", "m m rad", "m m rad"},                // planar
+    {7, 6, 3, nullptr, "m m m 1 1 1 1", "m m m rad rad rad"},  // floating
+};
+constexpr const ElementKindInfo& info_of(ElementKind kind) {
+  return element_kind_table[static_cast<int>(kind)];
+}
+
 /// One motion of a joint: a fixed placement after the previous frame, then the motion. Frames are
 /// turned so that the axis of the first three kinds, and the normal of planar, is z.
 struct Element {

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <optional>
 
+#include "linkwise/spatial/composite.hpp"
+
 namespace linkwise {
 namespace {
 
@@ -48,34 +50,27 @@ void set_hinge(BodyConstants<double>& k) {
   k.tree.r = {k.a, -k.d * sa, k.d * ca};
 }
 
-Inertia<double> moved(const Xform& new_to_old, const Inertia<double>& M) {
-  ArticulatedInertia<double> Y;
-  add_inertia(Y, M);
-  const ArticulatedInertia<double> Z = transform_to_parent(new_to_old, Y);
-  return {M.m, transpose_times(new_to_old.R, M.mc) + M.m * new_to_old.r, Z.C};
-}
-
 }  // namespace
 
-void choose_hinge_frames(Model& model) {
-  const int n_bodies = model.n_bodies();
+void choose_hinge_frames(Bodies& bodies, PlacedJoints& placed) {
+  const int n_bodies = static_cast<int>(bodies.topology.size());
   std::vector<Xform> frame(n_bodies, Xform{Mat3<double>::identity(), {}});
   std::vector<char> has_frame(n_bodies, 0);
   for (int n = 0; n < n_bodies; ++n) {
-    const int p = model.topology[n].parent;
-    if (p < 0 || has_frame[p] || model.topology[n].kind != BodyKind::revolute ||
-        model.topology[p].kind == BodyKind::general)
+    const int p = bodies.topology[n].parent;
+    if (p < 0 || has_frame[p] || bodies.topology[n].kind != BodyKind::revolute ||
+        bodies.topology[p].kind == BodyKind::general)
       continue;
-    if (const auto X = common_normal_frame(model.constants[n].tree)) {
+    if (const auto X = common_normal_frame(bodies.constants[n].tree)) {
       frame[p] = *X;
       has_frame[p] = 1;
-      model.topology[n].kind = BodyKind::hinge;
+      bodies.topology[n].kind = BodyKind::hinge;
     }
   }
   for (int n = 0; n < n_bodies; ++n) {
-    BodyTopology& body = model.topology[n];
-    BodyConstants<double>& k = model.constants[n];
-    Element& first = model.elements[body.first_element];
+    BodyTopology& body = bodies.topology[n];
+    BodyConstants<double>& k = bodies.constants[n];
+    Element& first = placed.elements[body.first_element];
     if (body.parent >= 0 && has_frame[body.parent]) {
       const Xform back = inverse(frame[body.parent]);
       k.tree = k.tree * back;
@@ -83,12 +78,12 @@ void choose_hinge_frames(Model& model) {
     }
     if (has_frame[n]) {
       k.tree = frame[n] * k.tree;
-      k.inertia = moved(inverse(frame[n]), k.inertia);
+      k.inertia = transform_to_parent(inverse(frame[n]), k.inertia);
     }
     if (body.kind == BodyKind::hinge) set_hinge(k);
     if (body.kind != BodyKind::general) first.placement = k.tree;
   }
-  for (JointInfo& joint : model.joints)
+  for (JointInfo& joint : placed.joints)
     if (has_frame[joint.body]) joint.to_user = joint.to_user * inverse(frame[joint.body]);
 }
 

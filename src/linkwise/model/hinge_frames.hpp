@@ -5,13 +5,13 @@
 // gives the child the placement of [denavit1955]: two planar rotations and two shifts along axes
 // instead of a full rotation and translation, less than half the arithmetic of an inertia's
 // transform.
-#include "linkwise/model/model.hpp"
+#include "linkwise/model/make_bodies.hpp"
 
 namespace linkwise {
 
-/// Chooses the frames of all bodies of a model whose axes are along z, moves what is expressed in
-/// them (placements, inertias, the way back to the user's frames), and marks hinges. Common normals
-/// that lie far away (nearly parallel axes) are left alone: a distant origin would cost digits.
-void choose_hinge_frames(Model& model);
+/// Chooses the frames of all bodies whose axes are along z, moves what is expressed in them
+/// (placements, inertias, the way back to the user's frames), and marks hinges. Common normals that
+/// lie far away (nearly parallel axes) are left alone: a distant origin would cost digits.
+void choose_hinge_frames(Bodies& bodies, PlacedJoints& placed);
 
 }  // namespace linkwise

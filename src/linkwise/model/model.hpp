@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "linkwise/joints/element.hpp"
+#include "linkwise/model/joint_types.hpp"
 #include "linkwise/model/name_index.hpp"
 #include "linkwise/model/spec.hpp"
 #include "linkwise/spatial/inertia.hpp"
@@ -64,6 +65,7 @@ struct JointInfo {
   int first_element = 0, n_elements = 0;
   int q = 0, nq = 0, v = 0, nv = 0;
   int link;                   ///< child link (index into links)
+  int spec = -1;              ///< index in the spec's joints; one past the end: the floating base's
   Transform<double> to_user;  ///< last element's frame -> the user's joint frame
   bool last_of_body = true;   ///< its frame is the body's frame
 };
@@ -91,12 +93,16 @@ class Model {
   int link_index(const std::string& name) const;
   /// q at the zero position: zeros, quaternions (0, 0, 0, 1).
   std::vector<double> neutral_configuration() const;
-  /// "of arm.urdf" or "" : the tail of messages about an element of this model.
-  std::string where() const { return spec_.source.empty() ? "" : " of " + spec_.source; }
+  /// The tail of messages about an element of this model.
+  std::string where() const { return source_of(spec_); }
   bool has_passive_forces() const { return has_passive_; }
   /// First body whose 6x6 inertia is singular (index), or -1; the constraint-force form needs none.
   int singular_body() const { return singular_body_; }
   std::string body_name(int body) const;
+  /// What the user said about a joint, axes normalised.
+  const JointSpec& joint_spec(int joint) const;
+  /// Index of the joint inboard of each joint, -1 at the ground.
+  std::vector<int> joint_parents() const;
 
   std::vector<BodyTopology> topology;
   std::vector<BodyConstants<double>> constants;
@@ -114,8 +120,8 @@ class Model {
   int n_general = 0;
 
  private:
-  friend class ModelAssembly;
   ModelSpec spec_;
+  JointSpec floating_joint_;
   int nq_ = 0, nv_ = 0;
   double total_mass_ = 0;
   bool has_passive_ = false;

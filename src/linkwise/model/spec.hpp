@@ -1,6 +1,6 @@
 #pragma once
 // What a user says about a machine: links and joints by name, in the user's frames. ModelBuilder
-// collects it; Model::build turns it into the arrays that the sweeps run over.
+// collects it; the constructor of Model turns it into the arrays that the sweeps run over.
 #include <array>
 #include <limits>
 #include <string>
@@ -10,6 +10,7 @@
 
 namespace linkwise {
 
+/// In the order of joint_type_table; models are stored with these numbers.
 enum class JointType {
   fixed,
   revolute,
@@ -23,6 +24,7 @@ enum class JointType {
   floating,
   composite,
 };
+inline constexpr int n_joint_types = static_cast<int>(JointType::composite) + 1;
 
 /// One screw axis of a stack, in the joint frame.
 enum class AxisKind { revolute, prismatic, helical };
@@ -78,6 +80,9 @@ inline constexpr DofPropertyEntry dof_property_table[n_dof_properties] = {
     {"limit_damping", 0, false, false},
 };
 
+/// Throws InputError where the name is unknown.
+DofProperty dof_property_from_name(const std::string& name);
+
 /// Only what differs from the table's fallbacks, so that a million plain joints stay small.
 struct DofValue {
   DofProperty property;
@@ -96,6 +101,8 @@ struct JointSpec {
 };
 
 enum class NoteLevel { merge, warning, info };
+const char* note_level_name(NoteLevel level);
+NoteLevel note_level_from_name(const std::string& name);
 /// What building a model merged, what to beware of, what a reader left out.
 struct Note {
   NoteLevel level;
@@ -114,10 +121,10 @@ struct ModelSpec {
   std::vector<Note> notes;  ///< of whoever read the model from a file
 };
 
-/// Degrees of freedom of a joint type; a composite has one per axis.
-int joint_dof(const JointSpec& joint);
-const char* joint_type_name(JointType type);
-JointType joint_type_from_name(const std::string& name);
+/// " of arm.urdf" or "": the tail of messages about an element of this machine.
+inline std::string source_of(const ModelSpec& spec) {
+  return spec.source.empty() ? "" : " of " + spec.source;
+}
 
 std::string serialize(const ModelSpec& spec);
 ModelSpec deserialize(const std::string& bytes);

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/model/joint_types.hpp"
 
 namespace linkwise {
 namespace {
@@ -64,6 +65,17 @@ bool clearly_negative(double mass, const double principal[3]) {
   return principal[0] < -std::max(1e-6 * principal[2], 1e-12 * mass);
 }
 
+void validate(ModelSpec& spec, std::vector<Note>& notes) {
+  const std::string where = source_of(spec);
+  if (spec.links.empty())
+    throw InputError("model '" + spec.name + "'" + where + " has no links; add at least one");
+  if (!finite(spec.gravity))
+    throw InputError("model '" + spec.name + "'" + where +
+                     ": gravity is not finite; give three finite numbers in m/s2");
+  for (const LinkSpec& link : spec.links) validate_link(link, where, notes);
+  for (JointSpec& joint : spec.joints) validate_joint(joint, where);
+}
+
 void validate_link(const LinkSpec& link, const std::string& where, std::vector<Note>& notes) {
   const std::string head = "link '" + link.name + "'" + where + ": ";
   if (link.name.empty())
@@ -109,17 +121,12 @@ void validate_joint(JointSpec& joint, const std::string& where) {
   if (worst > 1e-6 || det < 0)
     throw InputError(
         head + "rotation is not a rotation matrix; give an orthonormal right-handed 3x3 matrix");
-  const size_t expected = joint.type == JointType::universal ? 2
-                          : joint.type == JointType::fixed || joint.type == JointType::spherical ||
-                                  joint.type == JointType::floating
-                              ? 0
-                              : 1;
-  if (joint.type == JointType::composite ? joint.axes.empty() : joint.axes.size() < expected)
-    throw InputError(
-        head + "has " + std::to_string(joint.axes.size()) + " axes; a " +
-        joint_type_name(joint.type) + " joint needs " +
-        (joint.type == JointType::composite ? "at least one" : std::to_string(expected)));
-  if (joint.type != JointType::composite) joint.axes.resize(expected);
+  const int n_axes = static_cast<int>(joint.axes.size()), expected = info_of(joint.type).n_axes;
+  if (n_axes < std::abs(expected))
+    throw InputError(head + "has " + std::to_string(n_axes) + " axes; a " +
+                     joint_type_name(joint.type) + " joint needs " +
+                     (expected < 0 ? "at least one" : std::to_string(expected)));
+  if (expected >= 0) joint.axes.resize(expected);
   for (AxisSpec& a : joint.axes) {
     if (!finite(a.axis)) throw InputError(head + "axis is not finite; give three finite numbers");
     const double largest = std::max({std::abs(a.axis.x), std::abs(a.axis.y), std::abs(a.axis.z)});
@@ -161,7 +168,9 @@ void append_dof_properties(const JointSpec& joint, const std::string& where,
     }
   }
   const auto at = [&](DofProperty p, int i) { return dof[static_cast<int>(p)][start + i]; };
-  const bool quaternion = joint.type == JointType::spherical || joint.type == JointType::floating;
+  bool quaternion = false;
+  for (int k = 0; k < n_joint_elements(joint); ++k)
+    quaternion |= info_of(joint_element(joint, k).kind).quaternion >= 0;
   for (int i = 0; i < nv; ++i) {
     if (at(DofProperty::lower, i) > at(DofProperty::upper, i))
       throw InputError(head + "lower limit is above the upper limit; swap them");

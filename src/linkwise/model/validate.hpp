@@ -1,12 +1,17 @@
 #pragma once
-// Checks of single elements, before anything is built. Every message is one line: element, file,
-// remedy.
+// Checks of single links and joints, before anything is built. Every message is one line: element,
+// file, remedy.
+#include <array>
 #include <string>
 #include <vector>
 
-#include "linkwise/model/model.hpp"
+#include "linkwise/model/spec.hpp"
 
 namespace linkwise {
+
+/// validate_link and validate_joint on everything in the spec. Throws InputError where there are no
+/// links or gravity is not finite.
+void validate(ModelSpec& spec, std::vector<Note>& notes);
 
 /// Whether ascending principal moments are negative beyond the rounding of printed numbers.
 bool clearly_negative(double mass, const double principal[3]);

@@ -12,8 +12,7 @@ namespace {
 template <class Q, class F>
 void for_quaternions(const Model& model, Q* q, F&& f) {
   for (const Element& e : model.elements)
-    if (e.kind == ElementKind::spherical || e.kind == ElementKind::floating)
-      f(e, q + e.q + e.nq - 4);
+    if (const int own = info_of(e.kind).quaternion; own >= 0) f(e, q + e.q + own);
 }
 
 double length(const double* p) {

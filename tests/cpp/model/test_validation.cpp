@@ -159,15 +159,15 @@ const Wrong wrong_joints[] = {
      "joint 'elbow' of arm.urdf: child link 'gripper' does not exist; known: base, upper, lower"},
     {"two_parents",
      [](ModelSpec& s) { s.joints.push_back(joint("extra", JointType::revolute, "base", "lower")); },
-     "link 'lower' of arm.urdf is the child of two joints, 'elbow' and 'extra'; a tree link has "
-     "one parent: remove one joint"},
+     "joint 'elbow' of arm.urdf closes a loop of joints 'shoulder', 'elbow' and 'extra' at link "
+     "'lower'; a model is a tree: remove one of these joints"},
     {"two_roots", [](ModelSpec& s) { s.joints.pop_back(); },
      "links 'base' and 'lower' of arm.urdf both have no parent; a model has one root: join them "
      "with a joint"},
     {"no_root",
      [](ModelSpec& s) { s.joints.push_back(joint("back", JointType::fixed, "lower", "base")); },
-     "model 'arm' of arm.urdf: every link has a parent, so link 'base' is on a cycle; remove the "
-     "joint that closes it"},
+     "joint 'back' of arm.urdf closes a loop of joints 'shoulder', 'elbow' and 'back' at link "
+     "'base'; a model is a tree: remove one of these joints"},
     {"cycle_apart",
      [](ModelSpec& s) {
        s.links.push_back(body("left"));
@@ -175,11 +175,10 @@ const Wrong wrong_joints[] = {
        s.joints.push_back(joint("there", JointType::revolute, "left", "right"));
        s.joints.push_back(joint("back", JointType::revolute, "right", "left"));
      },
-     "joint 'there' of arm.urdf: link 'right' is on a cycle that the root 'base' does not reach; "
-     "remove the joint that closes it"},
+     "joint 'back' of arm.urdf closes a loop of joints 'there' and 'back' at link 'left'; a model "
+     "is a tree: remove one of these joints"},
     {"own_child", [](ModelSpec& s) { s.joints[1].parent = "lower"; },
-     "joint 'elbow' of arm.urdf: link 'lower' is on a cycle that the root 'base' does not reach; "
-     "remove the joint that closes it"},
+     "joint 'elbow' of arm.urdf: link 'lower' is its parent and its child; give it two links"},
     {"floating_name_taken",
      [](ModelSpec& s) {
        s.floating_base = true;

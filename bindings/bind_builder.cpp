@@ -1,0 +1,139 @@
+// ModelBuilder and what else makes a Model from Python's numbers.
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+
+#include "bind.hpp"
+#include "linkwise/model/builder.hpp"
+#include "py_model.hpp"
+#include "vectors.hpp"
+
+namespace linkwise::bindings {
+namespace {
+
+AxisSpec axis_spec(nb::handle item) {
+  const bool is_sequence = nb::isinstance<nb::tuple>(item) || nb::isinstance<nb::list>(item);
+  if (is_sequence && nb::len(item) > 0 && nb::isinstance<nb::str>(item[0]))
+    return make_axis(nb::cast<std::string>(nb::object(item[0])), vec3(item[1], "axis"),
+                     nb::len(item) > 2 ? nb::cast<double>(nb::object(item[2])) : 0);
+  return {AxisKind::revolute, vec3(item, "axis"), 0};
+}
+
+void add_joint(ModelBuilder& builder, std::string name, const std::string& type, std::string parent,
+               std::string child, nb::handle translation, nb::handle rotation, nb::handle axis,
+               nb::handle axes, double pitch, const nb::kwargs& properties) {
+  JointSpec joint;
+  joint.name = std::move(name);
+  joint.parent = std::move(parent);
+  joint.child = std::move(child);
+  if (!translation.is_none()) joint.translation = vec3(translation, "translation");
+  if (!rotation.is_none()) joint.rotation = mat3(rotation, "rotation");
+  if (!axes.is_none())
+    for (nb::handle item : axes) joint.axes.push_back(axis_spec(item));
+  else if (!axis.is_none())
+    joint.axes.push_back({AxisKind::revolute, vec3(axis, "axis"), 0});
+  ModelBuilder::Properties values;
+  for (auto [key, value] : properties) {
+    values.emplace_back(nb::cast<std::string>(key), std::nullopt);
+    if (value.is_none()) continue;
+    const ArrayIn given = as_array(value, values.back().first.c_str());
+    values.back().second.emplace(given.data(), given.data() + given.size());
+  }
+  builder.add_joint(std::move(joint), type, pitch, std::move(values));
+}
+
+/// A chain of equal links made without Python objects: N in the millions.
+PyModel* chain_of(size_t n, const std::string& joint, nb::handle axes, nb::handle translation,
+                  double mass, nb::handle com, nb::handle inertia, nb::handle gravity,
+                  double damping, double armature, bool floating_base) {
+  const ArrayIn axis_list = as_array(axes, "axes");
+  if (axis_list.ndim() != 2 || axis_list.shape(1) != 3 || axis_list.shape(0) == 0)
+    throw InputError("axes has shape " + shape_text(shape_of(axis_list)) +
+                     " but shape (k, 3) is expected");
+  EqualChain chain;
+  chain.n_links = n;
+  chain.joint = joint_type_from_name(joint);
+  for (const double* a = axis_list.data(); a != axis_list.data() + axis_list.size(); a += 3)
+    chain.axes.push_back({a[0], a[1], a[2]});
+  chain.translation = vec3(translation, "translation");
+  chain.link = link_spec("", mass, com, inertia);
+  chain.gravity = vec3(gravity, "gravity");
+  chain.damping = damping;
+  chain.armature = armature;
+  chain.floating_base = floating_base;
+  return new PyModel(make_chain(chain));
+}
+
+}  // namespace
+
+LinkSpec link_spec(std::string name, double mass, nb::handle com, nb::handle inertia) {
+  return make_link(std::move(name), mass, com.is_none() ? Vec3<double>{} : vec3(com, "com"),
+                   inertia.is_none() ? Mat3<double>{} : mat3(inertia, "inertia"));
+}
+
+void bind_builder(nb::module_& m) {
+  nb::class_<Note>(m, "Note", "What building a model merged, or warns about.")
+      .def_prop_ro("level", [](const Note& n) { return note_level_name(n.level); })
+      .def_ro("element", &Note::element)
+      .def_ro("text", &Note::text)
+      .def("__repr__", [](const Note& n) { return "Note(" + n.element + ": " + n.text + ")"; });
+
+  nb::class_<ModelBuilder>(
+      m, "ModelBuilder",
+      "Collects links and joints by name; build() checks them and gives the immutable Model.\n\n"
+      "SI units. Frames as in URDF: a joint's frame is placed in its parent link's frame; the "
+      "child\n"
+      "link's frame coincides with it when the joint is at zero.")
+      .def(
+          "__init__",
+          [](ModelBuilder* self, std::string name, nb::object gravity, std::string source) {
+            if (gravity.is_none()) gravity = nb::make_tuple(0.0, 0.0, -9.81);
+            new (self) ModelBuilder(std::move(name), vec3(gravity, "gravity"), std::move(source));
+          },
+          "name"_a = "model", nb::kw_only(), "gravity"_a = nb::none(), "source"_a = "")
+      .def(
+          "add_link",
+          [](ModelBuilder& self, std::string name, double mass, nb::handle com,
+             nb::handle inertia) { self.add_link(link_spec(std::move(name), mass, com, inertia)); },
+          "name"_a, nb::kw_only(), "mass"_a = 0.0, "com"_a = nb::none(), "inertia"_a = nb::none(),
+          "Adds a link: mass [kg], centre of mass (3,) [m] in the link frame, inertia (3, 3) [kg "
+          "m2] about the\n"
+          "centre of mass in link axes.")
+      .def("add_joint", &add_joint, "name"_a, "type"_a, "parent"_a, "child"_a, nb::kw_only(),
+           "translation"_a = nb::none(), "rotation"_a = nb::none(), "axis"_a = nb::none(),
+           "axes"_a = nb::none(), "pitch"_a = 0.0, "properties"_a,
+           "Adds a joint between two links.\n\n"
+           "type: fixed, revolute, continuous, prismatic, helical, cylindrical, universal, "
+           "spherical, planar,\n"
+           "floating or composite. translation (3,) [m] and rotation (3, 3) place the joint frame "
+           "in the parent link\n"
+           "frame; axis (3,) in the joint frame (normal of a planar joint); axes: two for "
+           "universal, a list of\n"
+           "(kind, axis) or (\"helical\", axis, pitch) for composite; pitch [m/rad].\n"
+           "Properties, one value or one per degree of freedom: damping, friction, "
+           "friction_velocity, stiffness,\n"
+           "rest_position, armature, lower, upper, effort, velocity, limit_stiffness, "
+           "limit_damping.")
+      .def(
+          "add_note", &ModelBuilder::add_note, "level"_a, "element"_a, "text"_a,
+          "Adds a note for Model.notes, as readers of files do about what they leave out; level is "
+          "\"merge\",\n"
+          "\"warning\" or \"info\".")
+      .def("set_floating_base", &ModelBuilder::set_floating_base, "joint_name"_a = "root_joint",
+           "The root link floats on a joint of this name instead of being welded to the ground.")
+      .def(
+          "build",
+          [](const ModelBuilder& self, bool keep_fixed) {
+            return new PyModel(self.spec(keep_fixed));
+          },
+          nb::kw_only(), "keep_fixed"_a = false,
+          "Checks everything and builds the Model; InputError names the element and the remedy. "
+          "keep_fixed keeps\n"
+          "fixed joints whose child has mass as joints with a load instead of merging the child "
+          "into its parent.");
+
+  m.def("make_chain", &chain_of, "n_bodies"_a, nb::kw_only(), "joint"_a, "axes"_a, "translation"_a,
+        "mass"_a, "com"_a, "inertia"_a, "gravity"_a, "damping"_a = 0.0, "armature"_a = 0.0,
+        "floating_base"_a = false);
+}
+
+}  // namespace linkwise::bindings

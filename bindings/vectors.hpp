@@ -1,0 +1,30 @@
+#pragma once
+// Vectors and matrices of three from Python.
+#include "arrays.hpp"
+#include "linkwise/model/spec.hpp"
+#include "linkwise/spatial/vec3.hpp"
+
+namespace linkwise::bindings {
+
+inline Vec3<double> vec3(nb::handle value, const char* name) {
+  const ArrayIn a = as_array(value, name);
+  if (a.ndim() != 1 || a.shape(0) != 3)
+    throw InputError(std::string(name) + " has shape " + shape_text(shape_of(a)) +
+                     " but shape (3,) is expected");
+  return {a.data()[0], a.data()[1], a.data()[2]};
+}
+
+inline Mat3<double> mat3(nb::handle value, const char* name) {
+  const ArrayIn a = as_array(value, name);
+  if (a.ndim() != 2 || a.shape(0) != 3 || a.shape(1) != 3)
+    throw InputError(std::string(name) + " has shape " + shape_text(shape_of(a)) +
+                     " but shape (3, 3) is expected");
+  Mat3<double> m;
+  std::copy(a.data(), a.data() + 9, m.m);
+  return m;
+}
+
+/// A link from its mass, and its centre of mass and inertia or None.
+LinkSpec link_spec(std::string name, double mass, nb::handle com, nb::handle inertia);
+
+}  // namespace linkwise::bindings

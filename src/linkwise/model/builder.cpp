@@ -1,0 +1,108 @@
+#include "linkwise/model/builder.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/model/joint_types.hpp"
+
+namespace linkwise {
+LinkSpec make_link(std::string name, double mass, const Vec3<double>& com,
+                   const Mat3<double>& inertia) {
+  const auto& I = inertia.m;
+  double scale = 0;
+  for (double x : I) scale = std::max(scale, std::abs(x));
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < i; ++j)
+      if (std::abs(I[3 * i + j] - I[3 * j + i]) > 1e-9 * scale)
+        throw InputError("link '" + name +
+                         "': inertia is not symmetric; give a symmetric 3x3 matrix");
+  return {std::move(name), mass, com, {{I[0], I[3], I[4], I[6], I[7], I[8]}}};
+}
+
+AxisSpec make_axis(const std::string& kind, const Vec3<double>& axis, double pitch) {
+  for (AxisKind k : {AxisKind::revolute, AxisKind::prismatic, AxisKind::helical})
+    if (kind == axis_kind_name(k)) return {k, axis, pitch};
+  throw InputError("axis kind '" + kind + "' is unknown; known: revolute, prismatic, helical");
+}
+
+ModelBuilder::ModelBuilder(std::string name, const Vec3<double>& gravity, std::string source) {
+  spec_.name = std::move(name);
+  spec_.gravity = gravity;
+  spec_.source = std::move(source);
+}
+
+void ModelBuilder::add_joint(JointSpec joint, const std::string& type, double pitch,
+                             Properties properties) {
+  try {
+    joint.type = joint_type_from_name(type);
+    for (auto& [name, values] : properties) {
+      const DofProperty property = dof_property_from_name(name);
+      const double fallback = dof_property_table[static_cast<int>(property)].fallback;
+      if (!values || (values->size() == 1 && values->front() == fallback)) continue;
+      joint.dof.push_back({property, std::move(*values)});
+    }
+  } catch (const InputError& error) {
+    throw InputError("joint '" + joint.name + "'" + source_of(spec_) + ": " + error.what());
+  }
+  if (joint.axes.empty() && joint.type != JointType::composite) joint.axes.emplace_back();
+  if (joint.type == JointType::helical) joint.axes[0].pitch = pitch;
+  spec_.joints.push_back(std::move(joint));
+}
+
+void ModelBuilder::add_note(const std::string& level, std::string element, std::string text) {
+  spec_.notes.push_back({note_level_from_name(level), std::move(element), std::move(text)});
+}
+
+void ModelBuilder::set_floating_base(std::string joint_name) {
+  spec_.floating_base = true;
+  spec_.floating_joint = std::move(joint_name);
+}
+
+ModelSpec ModelBuilder::spec(bool keep_fixed) const {
+  ModelSpec spec = spec_;
+  spec.keep_fixed = keep_fixed;
+  return spec;
+}
+
+ModelSpec make_chain(const EqualChain& chain) {
+  ModelSpec spec;
+  spec.name = "chain";
+  spec.gravity = chain.gravity;
+  spec.floating_base = chain.floating_base;
+  spec.links.reserve(chain.n_links + 1);
+  spec.joints.reserve(chain.n_links);
+  if (!chain.floating_base) spec.links.push_back({"ground", 0, {}, {}});
+  LinkSpec link = chain.link;
+  JointSpec joint;
+  joint.type = chain.joint;
+  if (chain.damping != 0) joint.dof.push_back({DofProperty::damping, {chain.damping}});
+  if (chain.armature != 0) joint.dof.push_back({DofProperty::armature, {chain.armature}});
+  for (size_t i = 0; i < chain.n_links; ++i) {
+    link.name = "link_" + std::to_string(i + 1);
+    spec.links.push_back(link);
+    if (chain.floating_base && i == 0) continue;
+    joint.name = "joint_" + std::to_string(i + 1);
+    joint.parent = spec.links[spec.links.size() - 2].name;
+    joint.child = link.name;
+    joint.translation = i == 0 ? Vec3<double>{} : chain.translation;
+    joint.axes.clear();
+    for (int k = 0; k < std::max(1, info_of(chain.joint).n_axes); ++k)
+      joint.axes.push_back({AxisKind::revolute, chain.axes[(i + k) % chain.axes.size()], 0});
+    spec.joints.push_back(joint);
+  }
+  return spec;
+}
+
+ModelSpec with_payload(ModelSpec spec, const std::string& link, LinkSpec payload) {
+  JointSpec weld;
+  weld.name = payload.name + "_mount";
+  weld.type = JointType::fixed;
+  weld.parent = link;
+  weld.child = payload.name;
+  spec.links.push_back(std::move(payload));
+  spec.joints.push_back(std::move(weld));
+  return spec;
+}
+
+}  // namespace linkwise

@@ -1,0 +1,57 @@
+#pragma once
+// Collects the links and joints of a machine into a ModelSpec, and changes a spec that is there.
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "linkwise/model/spec.hpp"
+
+namespace linkwise {
+
+/// A link from its inertia as a full matrix; throws InputError where that is not symmetric.
+LinkSpec make_link(std::string name, double mass, const Vec3<double>& com,
+                   const Mat3<double>& inertia);
+/// An axis of a composite joint; kind is "revolute", "prismatic" or "helical".
+AxisSpec make_axis(const std::string& kind, const Vec3<double>& axis, double pitch);
+
+class ModelBuilder {
+ public:
+  ModelBuilder(std::string name, const Vec3<double>& gravity, std::string source);
+
+  void add_link(LinkSpec link) { spec_.links.push_back(std::move(link)); }
+
+  /// Property names of dof_property_table with one value, or one per degree of freedom, or nothing.
+  using Properties = std::vector<std::pair<std::string, std::optional<std::vector<double>>>>;
+  /// A joint of a type given by its name; without axes it takes z, unless it is composite. Pitch is
+  /// that of a helical joint, m/rad. Throws InputError where the type or a property is unknown.
+  void add_joint(JointSpec joint, const std::string& type, double pitch, Properties properties);
+
+  /// level: "merge", "warning" or "info".
+  void add_note(const std::string& level, std::string element, std::string text);
+  void set_floating_base(std::string joint_name);
+
+  /// What was collected; the constructor of Model checks it.
+  ModelSpec spec(bool keep_fixed = false) const;
+
+ private:
+  ModelSpec spec_;
+};
+
+/// Links that are all the same, in a row.
+struct EqualChain {
+  size_t n_links = 0;
+  JointType joint = JointType::revolute;
+  std::vector<Vec3<double>> axes;  ///< joint i takes number i modulo their count
+  Vec3<double> translation;        ///< from one joint to the next, m
+  LinkSpec link;                   ///< its name does not matter
+  Vec3<double> gravity;
+  double damping = 0, armature = 0;
+  bool floating_base = false;
+};
+ModelSpec make_chain(const EqualChain& chain);
+
+/// The same machine with one more link welded to one of its links.
+ModelSpec with_payload(ModelSpec spec, const std::string& link, LinkSpec payload);
+
+}  // namespace linkwise

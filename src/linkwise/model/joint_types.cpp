@@ -1,0 +1,97 @@
+#include "linkwise/model/joint_types.hpp"
+
+#include <sstream>
+
+#include "linkwise/base/error.hpp"
+
+namespace linkwise {
+
+using enum ElementKind;
+
+const JointTypeInfo joint_type_table[n_joint_types] = {
+    {JointType::fixed, "fixed", 0, 1, {{fixed}}, "", ""},
+    {JointType::revolute, "revolute", 1, 1, {{revolute, 0}}, "", ""},
+    {JointType::continuous, "continuous", 1, 1, {{revolute, 0}}, "", ""},
+    {JointType::prismatic, "prismatic", 1, 1, {{prismatic, 0}}, "", ""},
+    {JointType::helical, "helical", 1, 1, {{helical, 0}}, "", ""},
+    {JointType::cylindrical,
+     "cylindrical",
+     1,
+     2,
+     {{prismatic, 0}, {revolute, 0}},
+     "translation angle",
+     "v w"},
+    {JointType::universal,
+     "universal",
+     2,
+     2,
+     {{revolute, 0}, {revolute, 1}},
+     "angle1 angle2",
+     "w1 w2"},
+    {JointType::spherical, "spherical", 0, 1, {{spherical}}, "qx qy qz qw", "wx wy wz"},
+    {JointType::planar, "planar", 1, 1, {{planar, 0}}, "x y angle", "vx vy wz"},
+    {JointType::floating, "floating", 0, 1, {{floating}}, "x y z qx qy qz qw", "vx vy vz wx wy wz"},
+    {JointType::composite, "composite", -1, -1, {}, "1 2 3 4 5 6", "1 2 3 4 5 6"},
+};
+
+namespace {
+
+std::vector<std::string> words(const char* text) {
+  std::istringstream stream(text);
+  std::vector<std::string> out;
+  for (std::string word; stream >> word;) out.push_back(word);
+  return out;
+}
+
+std::vector<ScalarLabel> labels(const JointSpec& joint, const char* suffixes,
+                                const char* ElementKindInfo::*units) {
+  std::vector<ScalarLabel> out;
+  for (int k = 0; k < n_joint_elements(joint); ++k)
+    for (const std::string& unit : words(info_of(joint_element(joint, k).kind).*units))
+      out.push_back({"", unit});
+  const std::vector<std::string> names = words(suffixes);
+  if (out.size() > 1)
+    for (size_t k = 0; k < out.size(); ++k) out[k].suffix = names.at(k);
+  return out;
+}
+
+}  // namespace
+
+ElementKind element_kind(AxisKind kind) {
+  return kind == AxisKind::revolute ? revolute : kind == AxisKind::prismatic ? prismatic : helical;
+}
+
+int n_joint_elements(const JointSpec& joint) {
+  const int n = info_of(joint.type).n_elements;
+  return n < 0 ? static_cast<int>(joint.axes.size()) : n;
+}
+
+JointElement joint_element(const JointSpec& joint, int k) {
+  const JointTypeInfo& info = info_of(joint.type);
+  return info.n_elements < 0 ? JointElement{element_kind(joint.axes[k].kind), k} : info.elements[k];
+}
+
+int joint_dof(const JointSpec& joint) {
+  int dof = 0;
+  for (int k = 0; k < n_joint_elements(joint); ++k) dof += info_of(joint_element(joint, k).kind).nv;
+  return dof;
+}
+
+JointType joint_type_from_name(const std::string& name) {
+  std::string known;
+  for (const JointTypeInfo& entry : joint_type_table) {
+    if (name == entry.name) return entry.type;
+    known += (known.empty() ? "" : ", ") + std::string(entry.name);
+  }
+  throw InputError("joint type '" + name + "' is unknown; known: " + known);
+}
+
+std::vector<ScalarLabel> coordinate_labels(const JointSpec& joint) {
+  return labels(joint, info_of(joint.type).q_labels, &ElementKindInfo::q_units);
+}
+
+std::vector<ScalarLabel> rate_labels(const JointSpec& joint) {
+  return labels(joint, info_of(joint.type).v_labels, &ElementKindInfo::v_units);
+}
+
+}  // namespace linkwise

@@ -1,0 +1,19 @@
+#pragma once
+// The arrays over bodies: how each is joined, and its constants.
+#include "linkwise/model/place_joints.hpp"
+
+namespace linkwise {
+
+struct Bodies {
+  std::vector<BodyTopology> topology;
+  std::vector<BodyConstants<double>> constants;
+  int n_general = 0;
+  int singular = -1;  ///< the first whose inertia is singular, -1: none
+};
+
+/// Bodies from the tree, and in `placed` which joint belongs to which. Throws InputError where
+/// massless links leave more than six degrees of freedom between two bodies.
+Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const BodyTree& tree,
+                   PlacedJoints& placed, std::vector<Note>& notes);
+
+}  // namespace linkwise

@@ -1,0 +1,138 @@
+// A ModelSpec as a flat byte string: plain numbers in the machine's order, counts as 64-bit
+// integers. One function names what is stored and in which order; an archive writes or reads it.
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/model/spec.hpp"
+
+namespace linkwise {
+namespace {
+
+constexpr char magic[] = "linkwise-model-1";
+
+struct Writer {
+  std::string bytes = magic;
+
+  void raw(const void* data, size_t n) { bytes.append(static_cast<const char*>(data), n); }
+  template <class E>
+  void choice(E value, int) {
+    raw(&value, sizeof(E));
+  }
+  template <class V>
+  void size(const V& values) {
+    const std::uint64_t n = values.size();
+    raw(&n, sizeof(n));
+  }
+};
+
+struct Reader {
+  const std::string& bytes;
+  size_t at = 0;
+
+  [[noreturn]] static void fail(const char* what) {
+    throw InputError(std::string("model data is ") + what +
+                     "; it was not written by this version of linkwise");
+  }
+  void raw(void* out, size_t n) {
+    if (n > bytes.size() - at) fail("cut short");
+    if (n == 0) return;  // `out` may be null: an empty vector's
+    std::memcpy(out, bytes.data() + at, n);
+    at += n;
+  }
+  /// An enumeration of n values, or a truth value: anything else would be read out of bounds later.
+  template <class E>
+  void choice(E& value, int n) {
+    std::conditional_t<std::is_enum_v<E>, int, unsigned char> x{};
+    static_assert(sizeof(x) == sizeof(E));
+    raw(&x, sizeof(x));
+    if (x < 0 || x >= n) fail("damaged");
+    value = static_cast<E>(x);
+  }
+  template <class V>
+  void size(V& values) {
+    std::uint64_t n = 0;
+    raw(&n, sizeof(n));
+    if (n > bytes.size() - at) fail("cut short");
+    values.resize(n);
+  }
+};
+
+template <class A, class Text>
+void text(A& archive, Text& s) {
+  archive.size(s);
+  archive.raw(s.data(), s.size());
+}
+
+template <class A, class Joint>
+void joint_fields(A& archive, Joint& j) {
+  text(archive, j.name);
+  archive.choice(j.type, n_joint_types);
+  text(archive, j.parent);
+  text(archive, j.child);
+  archive.raw(j.rotation.m, sizeof(j.rotation.m));
+  archive.raw(&j.translation.x, 3 * sizeof(double));
+  archive.size(j.axes);
+  for (auto& a : j.axes) {
+    archive.choice(a.kind, 3);
+    archive.raw(&a.axis.x, 3 * sizeof(double));
+    archive.raw(&a.pitch, sizeof(double));
+  }
+  archive.size(j.dof);
+  for (auto& d : j.dof) {
+    archive.choice(d.property, n_dof_properties);
+    archive.size(d.values);
+    archive.raw(d.values.data(), d.values.size() * sizeof(double));
+  }
+}
+
+template <class A, class Spec>
+void spec_fields(A& archive, Spec& spec) {
+  text(archive, spec.name);
+  text(archive, spec.source);
+  archive.raw(&spec.gravity.x, 3 * sizeof(double));
+  archive.choice(spec.floating_base, 2);
+  text(archive, spec.floating_joint);
+  archive.choice(spec.keep_fixed, 2);
+  archive.size(spec.prescribed);
+  for (auto& name : spec.prescribed) text(archive, name);
+  archive.size(spec.links);
+  for (auto& l : spec.links) {
+    text(archive, l.name);
+    archive.raw(&l.mass, sizeof(double));
+    archive.raw(&l.com.x, 3 * sizeof(double));
+    archive.raw(l.inertia.m, sizeof(l.inertia.m));
+  }
+  archive.size(spec.joints);
+  for (auto& j : spec.joints) joint_fields(archive, j);
+  archive.size(spec.notes);
+  for (auto& n : spec.notes) {
+    archive.choice(n.level, 3);
+    text(archive, n.element);
+    text(archive, n.text);
+  }
+}
+
+}  // namespace
+
+std::string serialize(const ModelSpec& spec) {
+  Writer writer;
+  spec_fields(writer, spec);
+  return std::move(writer.bytes);
+}
+
+ModelSpec deserialize(const std::string& bytes) {
+  if (!bytes.starts_with(magic))
+    throw InputError(
+        "model data was not written by this version of linkwise; build the model again from its "
+        "source");
+  Reader reader{bytes, sizeof(magic) - 1};
+  ModelSpec spec;
+  spec_fields(reader, spec);
+  if (reader.at != bytes.size()) Reader::fail("damaged");
+  return spec;
+}
+
+}  // namespace linkwise
