@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 from linkwise._core import Model
 from linkwise.io.complaint import complain, shorten
-from linkwise.io.urdf import Mimic, read_urdf
-from linkwise.io.urdf_tree import JointOrder
+from linkwise.io.urdf import JointOrder, Mimic, read_urdf
 from linkwise.io.xml import local_name, parse_xml
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)

@@ -1,27 +1,47 @@
-"""Reading URDF into a Model: strict checks, then yourdfpy, then the builder.
+"""Reading URDF into a Model.
 
-yourdfpy turns the checked document into placements, axes and inertia matrices. It never sees the
-original file: it would drop or replace by defaults what it cannot read, stop at a broken colour,
-and look for meshes. It gets the clean document of :mod:`linkwise.io.urdf_checks`.
+The document is read once, strictly: what is not there or is no number is refused here, with its
+line. Whether the machine makes sense (masses, axes, limits, the tree of the joints) is judged by
+the core alone, whose complaint gets the line of the element it is about.
 """
 
 from __future__ import annotations
 
-import io
 import math
 import os
+from collections import Counter
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 from lxml import etree
 
 from linkwise._core import InputError, Model, ModelBuilder
 from linkwise.io.complaint import complain, file_name, shorten
-from linkwise.io.urdf_checks import CheckedUrdf, check_urdf
-from linkwise.io.urdf_tree import JointOrder, check_tree, order_joints
+from linkwise.io.urdf_elements import UrdfElement
+from linkwise.io.xml import is_foreign, local_name
 
 Mimic = Literal["independent", "error"]
+JointOrder = Literal["file", "pinocchio"]
+
+JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
+_LIMITED = ("revolute", "prismatic")
+_LIMITS = ("lower", "upper", "effort", "velocity")
+_WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
+_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_LINK_CHILDREN = frozenset({"inertial", "visual", "collision"})
+_JOINT_CHILDREN = frozenset({"origin", "parent", "child", "axis", "limit", "dynamics", "mimic"})
+#: The part that a complaint of the core is about, by its first word.
+_PARTS = {
+    "mass": "mass",
+    "inertia": "inertia",
+    "axis": "axis",
+    "lower": "limit",
+    "effort": "limit",
+    "velocity": "limit",
+    "damping": "dynamics",
+    "friction": "dynamics",
+}
 
 
 def read_urdf(
@@ -42,108 +62,240 @@ def read_urdf(
     their own and noted as warnings ("independent", what Pinocchio does unless asked otherwise) or
     refused ("error").
     """
-    checked = check_urdf(path, root)
-    root_link = check_tree(path, checked.links, checked.joints)
-    if mimic == "error" and checked.mimics:
-        _refuse_mimic(checked)
-    robot = _parse_clean(checked)
-    builder = ModelBuilder(checked.name, gravity=gravity, source=file_name(path))
-    for link in robot.links:
-        _add_link(builder, link, checked)
-    for index in order_joints(checked.joints, root_link, joint_order):
-        _add_joint(builder, robot.joints[index], checked.joints[index].line, path)
+    reader = _Reader(path, root, mimic)
+    name = root.get("name") or os.path.splitext(os.path.basename(os.fspath(path)))[0]
+    builder = ModelBuilder(name, gravity=gravity, source=file_name(path))
+    for link in reader.links:
+        reader.add_link(builder, link)
+    joints = [reader.joint(element) for element in reader.joints]
+    for joint in depth_first(joints) if joint_order == "pinocchio" else joints:
+        builder.add_joint(joint.name, joint.type, joint.parent, joint.child, **joint.properties)
     if floating_base:
         builder.set_floating_base()
-    for note in checked.notes:
+    reader.note_what_is_left_out()
+    for note in reader.notes:
         builder.add_note(*note)
-    return builder.build(keep_fixed=keep_fixed)
-
-
-def _refuse_mimic(checked: CheckedUrdf) -> None:
-    joint, target = next(iter(checked.mimics.items()))
-    line = next(j.line for j in checked.joints if j.name == joint)
-    complain(
-        checked.path,
-        f"joint '{shorten(joint)}'",
-        f"mimics joint '{shorten(target)}', and couplings are not supported",
-        'let it move on its own with mimic="independent", or remove <mimic>',
-        line,
-    )
-
-
-def _parse_clean(checked: CheckedUrdf) -> Any:
-    # Imported here because it brings trimesh along, which costs most of a second.
-    import yourdfpy
-
-    document = io.BytesIO(etree.tostring(checked.robot))
-    checked.robot.clear()  # of large files one copy less
-    robot = yourdfpy.URDF.load(
-        document,
-        build_scene_graph=False,
-        build_collision_scene_graph=False,
-        load_meshes=False,
-        load_collision_meshes=False,
-        filename_handler=yourdfpy.urdf.filename_handler_null,
-    ).robot
-    names = [link.name for link in robot.links]
-    if names != list(checked.links) or [j.name for j in robot.joints] != [
-        j.name for j in checked.joints
-    ]:
-        raise AssertionError("yourdfpy lost links or joints of a checked document")
-    return robot
-
-
-def _placement(
-    matrix: npt.NDArray[np.float64] | None,
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    if matrix is None:
-        return np.eye(3), np.zeros(3)
-    return matrix[:3, :3], matrix[:3, 3]
-
-
-def _add_link(builder: ModelBuilder, link: Any, checked: CheckedUrdf) -> None:
-    if link.inertial is None:
-        builder.add_link(link.name)
-        return
-    rotation, com = _placement(link.inertial.origin)
-    inertia = rotation @ link.inertial.inertia @ rotation.T
     try:
-        builder.add_link(
-            link.name, mass=link.inertial.mass, com=com, inertia=0.5 * (inertia + inertia.T)
-        )
+        return builder.build(keep_fixed=keep_fixed)
     except InputError as error:
-        _with_line(error, checked.path, checked.links[link.name])
+        raise reader.with_line(error) from None
 
 
-def _add_joint(
-    builder: ModelBuilder, joint: Any, line: int | None, path: str | os.PathLike[str]
-) -> None:
-    rotation, translation = _placement(joint.origin)
-    properties: dict[str, Any] = {}
-    if joint.dynamics is not None:
-        properties["damping"] = float(joint.dynamics.damping or 0.0)
-        properties["friction"] = float(joint.dynamics.friction or 0.0)
-    if joint.limit is not None:
-        for name in ("lower", "upper", "effort", "velocity"):
-            value = getattr(joint.limit, name)
-            if value is not None:
-                properties[name] = value
-    if joint.type in ("revolute", "continuous", "prismatic", "planar"):
-        properties["axis"] = tuple(joint.axis / math.hypot(*joint.axis))
-    try:
-        builder.add_joint(
-            joint.name,
-            joint.type,
-            joint.parent,
-            joint.child,
-            translation=translation,
-            rotation=rotation,
-            **properties,
-        )
-    except InputError as error:
-        _with_line(error, path, line)
+@dataclass
+class UrdfJoint:
+    """What ModelBuilder.add_joint takes."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    properties: dict[str, Any]
 
 
-def _with_line(error: InputError, path: str | os.PathLike[str], line: int | None) -> None:
-    """Raise the builder's complaint again with the line of the element in front."""
-    raise InputError(f"{shorten(os.fspath(path), 400)}:{line}: {error}") from None
+def depth_first(joints: list[UrdfJoint]) -> list[UrdfJoint]:
+    """Depth first from the root, the joints of one link by name.
+
+    So do urdfdom and with it Pinocchio, and q and v can be handed over. Joints that no path from
+    the root reaches come last: the core refuses them.
+    """
+    outboard: dict[str, list[UrdfJoint]] = {}
+    for joint in joints:
+        outboard.setdefault(joint.parent, []).append(joint)
+    for siblings in outboard.values():
+        # std::map compares bytes; reversed because the stack is taken from its end.
+        siblings.sort(key=lambda joint: joint.name.encode(), reverse=True)
+    children = {joint.child for joint in joints}
+    stack = [j for link, found in outboard.items() if link not in children for j in found]
+    ordered = []
+    while stack:
+        joint = stack.pop()
+        ordered.append(joint)
+        stack += outboard.pop(joint.child, [])
+    taken = {id(joint) for joint in ordered}
+    return ordered + [joint for joint in joints if id(joint) not in taken]
+
+
+class _Reader:
+    """The links and joints of one file, where they stand in it, and the notes about them."""
+
+    def __init__(self, path: str | os.PathLike[str], root: etree._Element, mimic: Mimic) -> None:
+        self.path = path
+        self.notes: list[tuple[str, str, str]] = []
+        self.links: list[UrdfElement] = []
+        self.joints: list[UrdfElement] = []
+        self._mimic = mimic
+        self._mimics: dict[str, str] = {}
+        self._ignored: Counter[str] = Counter()
+        self._found: dict[str, UrdfElement] = {}
+        for element in root.iterchildren(tag=etree.Element):
+            tag = local_name(element)
+            if is_foreign(element, root):
+                self._refuse_xacro(element)
+                self._ignored[f"<{shorten(tag)}>"] += 1
+            elif tag in ("link", "joint"):
+                found = self.links if tag == "link" else self.joints
+                found.append(self._named(element, tag))
+            elif tag != "material":
+                self._ignored[f"<{shorten(tag)}>"] += 1
+        if not self.links:
+            remedy = "give a complete URDF (if it comes from xacro, expand it first)"
+            complain(path, "robot", "has no links", remedy, root.sourceline)
+
+    def _named(self, element: etree._Element, kind: str) -> UrdfElement:
+        name = element.get("name", "")
+        found = UrdfElement(self.path, element, f"{kind} '{shorten(name)}'" if name else kind)
+        if not name:
+            found.fail("has no name", 'add name="..."')
+        self._found[f"{kind} '{name}'"] = found
+        return found
+
+    def add_link(self, builder: ModelBuilder, link: UrdfElement) -> None:
+        name = str(link.get("name"))
+        link.count_unread(_LINK_CHILDREN, self._ignored)
+        inertial = link.child("inertial")
+        if inertial is None:
+            builder.add_link(name)
+            return
+        pose = inertial.origin()
+        if pose is None:
+            pose = np.eye(4)
+        mass = inertial.required("mass", 'add <mass value="..."/> in kg').number("value", "mass")
+        attributes = " ".join(f'{a}="..."' for a in _INERTIA)
+        moments = inertial.required("inertia", f"add <inertia {attributes}/>")
+        xx, xy, xz, yy, yz, zz = (moments.number(a, f"inertia {a}") for a in _INERTIA)
+        rotation = pose[:3, :3]
+        inertia = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
+        builder.add_link(name, mass=mass, com=pose[:3, 3], inertia=0.5 * (inertia + inertia.T))
+
+    def joint(self, element: UrdfElement) -> UrdfJoint:
+        name, kind = str(element.get("name")), element.get("type")
+        if kind not in JOINT_TYPES:
+            problem = "has no type" if kind is None else f"unknown type '{shorten(kind)}'"
+            element.fail(problem, f"use one of {', '.join(JOINT_TYPES)}")
+        ends = {}
+        for role in ("parent", "child"):
+            end = element.child(role)
+            link = None if end is None else end.get("link")
+            if not link:
+                element.fail(f"has no {role} link", f'add <{role} link="..."/>')
+            ends[role] = link
+        element.count_unread(_JOINT_CHILDREN, self._ignored)
+        properties: dict[str, Any] = {}
+        pose = element.origin()
+        if pose is not None:
+            properties.update(rotation=pose[:3, :3], translation=pose[:3, 3])
+        if kind in _WITH_AXIS:
+            properties["axis"] = self._axis(element, name)
+        limit = self._limit(element, name, kind)
+        if kind != "fixed":
+            properties.update(self._dynamics(element, name, kind))
+            self._read_mimic(element, name)
+        properties.update(limit)
+        return UrdfJoint(name, kind, ends["parent"], ends["child"], properties)
+
+    def _axis(self, element: UrdfElement, name: str) -> list[float]:
+        axis = element.child("axis")
+        if axis is None:
+            return [1.0, 0.0, 0.0]
+        xyz = axis.numbers("xyz", 3, "axis")
+        length = math.hypot(*xyz)
+        if length == 0:
+            return xyz  # for the core to refuse
+        if abs(length - 1) > 1e-3:
+            self._note(name, f"axis has length {length:.4g}; only its direction is used")
+        return [x / length for x in xyz]
+
+    def _limit(self, element: UrdfElement, name: str, kind: str) -> dict[str, float]:
+        if kind not in ("revolute", "continuous", "prismatic"):
+            return {}
+        limit = element.child("limit")
+        if limit is None:
+            if kind in _LIMITED:
+                self._note(name, f"has no <limit>, which a {kind} joint should have; unlimited")
+            return {}
+        given = [a for a in _LIMITS if limit.get(a) is not None]
+        found: dict[str, float] = {
+            a: limit.number(a, f"{a} limit") for a in ("effort", "velocity") if a in given
+        }
+        if kind not in _LIMITED:
+            return found
+        missing = [a for a in ("lower", "upper") if a not in given]
+        if len(missing) == 2:
+            # The format's default would be a range from 0 to 0, which nobody means.
+            self._note(name, "<limit> has no bounds; unlimited")
+            return found
+        if missing:
+            self._note(name, f"<limit> has no {missing[0]} bound; 0 is taken, as the format says")
+        bounds = {a: limit.number(a, f"{a} limit") if a in given else 0.0 for a in _LIMITS[:2]}
+        return bounds | found
+
+    def _dynamics(self, element: UrdfElement, name: str, kind: str) -> dict[str, float]:
+        dynamics = element.child("dynamics")
+        given = {}
+        for attribute in ("damping", "friction"):
+            if dynamics is None or dynamics.get(attribute) is None:
+                continue
+            value = dynamics.number(attribute, attribute)
+            if value > 0 and kind in ("planar", "floating"):
+                # One number for both lengths and angles has no meaning the format would define.
+                self._note(name, f"{attribute} of a {kind} joint is ignored")
+                continue
+            given[attribute] = value
+        return given
+
+    def _read_mimic(self, element: UrdfElement, name: str) -> None:
+        mimic = element.child("mimic")
+        if mimic is None:
+            return
+        for attribute in ("multiplier", "offset"):
+            if mimic.get(attribute) is not None:
+                mimic.number(attribute, f"mimic {attribute}")
+        target = mimic.get("joint")
+        if not target:
+            mimic.fail("<mimic> names no joint", 'add joint="..." or remove it')
+        if self._mimic == "error":
+            element.fail(
+                f"mimics joint '{shorten(target)}', and couplings are not supported",
+                'let it move on its own with mimic="independent", or remove <mimic>',
+            )
+        self._mimics[name] = target
+
+    def note_what_is_left_out(self) -> None:
+        # A target that does not exist is no error: the coupling is not used either way.
+        for joint, target in self._mimics.items():
+            missing = "" if f"joint '{target}'" in self._found else ", which does not exist"
+            self._note(
+                joint,
+                f"mimics joint '{shorten(target)}'{missing}: "
+                "the coupling is ignored, it moves independently",
+            )
+        for tag, count in sorted(self._ignored.items()):
+            text = f"{count} ignored: not part of the rigid-body dynamics"
+            self.notes.append(("info", tag, text))
+
+    def _note(self, element: str, text: str) -> None:
+        self.notes.append(("warning", element, text))
+
+    def _refuse_xacro(self, element: etree._Element) -> None:
+        if "xacro" in str(element.tag).rpartition(local_name(element))[0]:
+            complain(
+                self.path,
+                f"element 'xacro:{shorten(local_name(element))}'",
+                "this is a xacro file, not yet a URDF",
+                "expand it first: xacro FILE.xacro > FILE.urdf",
+                element.sourceline,
+            )
+
+    def with_line(self, error: InputError) -> InputError:
+        """The core's complaint, ELEMENT of FILE: PROBLEM; REMEDY, as FILE:LINE: ELEMENT: ..."""
+        element, _, rest = str(error).partition(f" of {file_name(self.path)}")
+        found = self._found.get(element)
+        words = rest.removeprefix(": ").split()
+        if found is None:  # links 'a' and 'b'
+            found = self._found.get("link " + element.rpartition(" and ")[2])
+        elif words and (part := _PARTS.get(words[0])):
+            for inner in ("inertial", part):
+                found = found.child(inner) or found
+        line = f":{found.line}" if found is not None and found.line else ""
+        text = shorten(f"{element}{rest}", 2000)
+        return InputError(f"{shorten(os.fspath(self.path), 400)}{line}: {text}")

@@ -17,6 +17,7 @@ from lxml import etree
 from linkwise.base import Array
 from linkwise.io.files import resolve_mesh
 from linkwise.io.numbers import parse_numbers
+from linkwise.io.urdf_elements import placement
 from linkwise.io.xml import local_name, parse_xml
 
 Color = tuple[float, float, float, float]
@@ -110,18 +111,9 @@ def _color(material: etree._Element) -> Color | None:
 
 
 def _placement(origin: etree._Element | None) -> Array:
-    placement = np.eye(4)
     if origin is None:
-        return placement
-    roll, pitch, yaw = _triple(origin, "rpy", "0 0 0")
-    (sr, sp, sy), (cr, cp, cy) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
-    placement[:3, :3] = [
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ]
-    placement[:3, 3] = _triple(origin, "xyz", "0 0 0")
-    return placement
+        return np.eye(4)
+    return placement(_triple(origin, "xyz", "0 0 0"), _triple(origin, "rpy", "0 0 0"))
 
 
 def _visual(
@@ -141,7 +133,7 @@ def _visual(
     color = None
     if material is not None:
         color = _color(material) or named.get(material.get("name", ""))
-    placement = _placement(_child(element, "origin"))
+    pose = _placement(_child(element, "origin"))
     kind, path = local_name(shape), None
     if kind == "box":
         size = _triple(shape, "size")
@@ -159,9 +151,7 @@ def _visual(
             return None
     else:
         return None
-    return Visual(
-        link, kind, placement, (float(size[0]), float(size[1]), float(size[2])), color, path
-    )
+    return Visual(link, kind, pose, (float(size[0]), float(size[1]), float(size[2])), color, path)
 
 
 def _readable(path: Path) -> bool:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
-from linkwise.io.urdf_tree import Edge, order_joints
+from linkwise.io.urdf import UrdfJoint, depth_first
 
 
 def notes(model):
@@ -27,6 +27,16 @@ def test_reads_joints_limits_and_passive_forces(arm):
     np.testing.assert_array_equal(model.friction, [0.25, 0])
     np.testing.assert_array_equal(model.gravity, [0, 0, -9.81])
     assert not [n for n in model.notes if n.level == "warning"]
+
+
+def test_links_without_mass_are_joints_and_no_bodies(arm):
+    text = arm.read_text()
+    start = text.index("<inertial>")
+    arm.write_text(text[:start] + text[text.index("</inertial>") + len("</inertial>") :])
+    model = lw.load(arm)
+    assert (model.n_joints, model.n_bodies) == (2, 1)
+    assert lw.joint_loads(model, [0.1, 0.2], [0, 0], [0, 0]).shape == (model.n_joints, 6)
+    assert model.body_masses.tolist() == [0, 1]
 
 
 def test_gravity_is_an_argument(arm, complaint):
@@ -165,28 +175,27 @@ def test_unknown_options_are_refused(arm, complaint):
 
 
 def edges(*pairs):
-    return [Edge(name, parent, child, None) for name, parent, child in pairs]
+    return [UrdfJoint(name, "fixed", parent, child, {}) for name, parent, child in pairs]
 
 
-def test_joint_orders():
+def test_depth_first_order():
     joints = edges(
         ("z_tip", "b", "c"),
         ("m", "root", "d"),
         ("z_first", "root", "b"),
         ("a_late", "d", "e"),
     )
-    names = [j.name for j in joints]
-    file_order = [names[i] for i in order_joints(joints, "root", "file")]
-    assert file_order == ["m", "z_first", "z_tip", "a_late"]
-    depth_first = [names[i] for i in order_joints(joints, "root", "pinocchio")]
-    assert depth_first == ["m", "a_late", "z_first", "z_tip"]
+    assert [j.name for j in depth_first(joints)] == ["m", "a_late", "z_first", "z_tip"]
 
 
-def test_orders_of_a_chain_deeper_than_the_recursion_limit():
-    n = 20_000
-    joints = edges(*((f"j{i}", f"l{i}", f"l{i + 1}") for i in reversed(range(n))))
-    for order in ("file", "pinocchio"):
-        assert order_joints(joints, "l0", order) == list(reversed(range(n)))
+def test_depth_first_order_of_a_chain_deeper_than_the_recursion_limit():
+    joints = edges(*((f"j{i}", f"l{i}", f"l{i + 1}") for i in reversed(range(20_000))))
+    assert depth_first(joints) == joints[::-1]
+
+
+def test_depth_first_order_keeps_joints_of_cycles_for_the_core_to_refuse():
+    joints = edges(("out", "root", "a"), ("ab", "a", "b"), ("ba", "b", "a"), ("cd", "c", "c"))
+    assert sorted(j.name for j in depth_first(joints)) == ["ab", "ba", "cd", "out"]
 
 
 def test_joint_orders_of_a_loaded_model(arm):
