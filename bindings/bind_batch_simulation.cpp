@@ -5,6 +5,7 @@
 #include "bind.hpp"
 #include "linkwise/simulate/batch_simulation.hpp"
 #include "py_simulation.hpp"
+#include "samples.hpp"
 #include "states.hpp"
 
 namespace linkwise::bindings {
@@ -20,8 +21,8 @@ const double* rows_of(const Argument& argument, size_t members) {
   return argument.data;
 }
 
-nb::dict simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, nb::handle tau,
-                          nb::handle times_in, nb::handle quantities, nb::handle threads) {
+nb::tuple simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, nb::handle tau,
+                           nb::handle times_in, nb::handle quantities, nb::handle threads) {
   std::vector<const Simulation*> all;
   for (nb::handle item : simulations) all.push_back(&nb::cast<PySimulation&>(item).simulation);
   if (all.empty()) throw InputError("there is no model; give at least one");
@@ -29,41 +30,20 @@ nb::dict simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, nb
   const Argument q("q0", {size(m.nq())}, q0), v("v0", {size(m.nv())}, v0),
       torque("tau", {size(m.nv())}, tau), times("times", {}, times_in);
   const size_t members = q.array.shape(0), n = times.array.size(), per = members / all.size();
-  const BatchStart start{rows_of(q, members), rows_of(v, members), rows_of(torque, members)};
-  Sample out;
-  nb::dict columns;
-  const auto column = [&](const char* quantity, const char* name, const Shape& tail, double*& to) {
-    if (!nb::cast<bool>(quantities.attr("__contains__")(quantity))) return;
-    const NewArray made({members, n}, tail);
-    columns[name] = made.array;
-    to = made.data;
-  };
-  const Shape coordinates{size(m.nq())}, rates{size(m.nv())}, wrenches{size(m.n_joints()), 6};
-  column("position", "position", coordinates, out.position);
-  column("velocity", "velocity", rates, out.velocity);
-  column("acceleration", "acceleration", rates, out.acceleration);
-  column("joint_load", "joint_load", wrenches, out.joint_load);
-  column("drive_torque", "drive_torque", rates, out.drive_torque);
-  column("energy", "kinetic_energy", {}, out.kinetic_energy);
-  column("energy", "potential_energy", {}, out.potential_energy);
-  const int team = threads_of(threads, 1 << 20);
+  const Start start{rows_of(q, members), rows_of(v, members), rows_of(torque, members)};
+  const Columns columns(m, {members, n}, quantities);
+  const Executor executor(threads_of(threads, 1 << 20));
   Interrupt interrupt;
-  std::vector<Ending> ends;
+  std::vector<Ending> endings;
   {
     const nb::gil_scoped_release release;
-    ends = simulate_batch(all, per, start, {times.data, n}, out, team,
-                          [&interrupt] { return !interrupt(); });
+    endings = simulate_batch(all, per, start, {times.data, n}, columns.sample, executor,
+                             [&interrupt] { return !interrupt(); });
   }
-  columns["interrupted"] = interrupt.was_keyboard();
-  NewArray end_times({members});
-  nb::list outcomes;
-  for (size_t i = 0; i < members; ++i) {
-    end_times.data[i] = ends[i].time;
-    outcomes.append(std::string(to_string(ends[i].outcome)));
-  }
-  columns["outcome"] = outcomes;
-  columns["stop_time"] = end_times.array;
-  return columns;
+  const bool interrupted = interrupt.was_keyboard();
+  nb::list ends;
+  for (Ending& ending : endings) ends.append(nb::cast(std::move(ending)));
+  return nb::make_tuple(columns.to_python(members), ends, interrupted);
 }
 
 }  // namespace
@@ -72,7 +52,8 @@ void bind_batch_simulation(nb::module_& m) {
   m.def("simulate_members", &simulate_members, "simulations"_a, nb::kw_only(), "q0"_a, "v0"_a,
         "tau"_a.none(), "times"_a, "quantities"_a, "threads"_a = nb::none(),
         "The loop behind linkwise.simulate_batch: rows (member, ...), members of one simulation "
-        "next to each other.");
+        "next to each other.\n"
+        "(arrays by name, endings, interrupted by Ctrl-C).");
 }
 
 }  // namespace linkwise::bindings

@@ -10,7 +10,7 @@
 namespace linkwise::bindings {
 namespace {
 
-/// f(scratch, q, v, out) for every state, over threads; out has `tail` numbers. v is zero where it
+/// f(model, q, v, out) for every state, over threads; out has `tail` numbers. v is zero where it
 /// is None.
 template <class F>
 nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handle threads,
@@ -19,19 +19,15 @@ nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handl
   States s(m, q, v, nb::none(), "tau", nb::none());
   NewArray out(s.lead, tail);
   const size_t n = product(tail);
-  const int team = threads_of(threads, s.count * m.n_bodies());
+  const Executor executor(threads_of(threads, s.count * m.n_bodies()));
   const std::vector<double> zero(m.nv());
-  Interrupt interrupt;
-  {
-    const nb::gil_scoped_release release;
-    over_parts(m, s.count, team, interrupt, [&](size_t first, size_t count) {
-      PyModel::Lease scratch(self);
+  without_gil([&](const GoOn& go_on) {
+    for_each_part(m, s.count, executor, go_on, [&](size_t first, size_t count) {
       for (size_t i = first; i < first + count; ++i)
-        f(*scratch, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : zero.data(),
+        f(m, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : zero.data(),
           out.data + i * n);
     });
-  }
-  interrupt.rethrow();
+  });
   return s.lead.empty() && tail.empty() ? nb::object(nb::float_(out.data[0])) : out.array;
 }
 
@@ -44,10 +40,13 @@ void bind_kinematics(nb::module_& m) {
       "mass_matrix",
       [](const PyModel& self, nb::handle q, nb::handle threads) {
         const size_t nv = self.model->nv();
-        return map_states(self, q, nb::none(), threads, {nv, nv},
-                          [](Scratch& scratch, const double* q, const double*, double* out) {
-                            scratch.mass_matrix(q, out);
-                          });
+        const States s(*self.model, q, nb::none(), nb::none(), "tau", nb::none());
+        const Executor executor(threads_of(threads, s.count * self.model->n_bodies()));
+        NewArray H(s.lead, {nv, nv});
+        without_gil([&](const GoOn& go_on) {
+          self.evaluator.mass_matrix(s.count, s.q.data, executor, H.data, go_on);
+        });
+        return H.array;
       },
       "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
       "Joint-space mass matrix (..., nv, nv), armature included.");
@@ -55,8 +54,7 @@ void bind_kinematics(nb::module_& m) {
       "passive_torque",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
         return map_states(self, q, v, threads, {size(self.model->nv())},
-                          [](Scratch& scratch, const double* q, const double* v, double* out) {
-                            const Model& m = scratch.model();
+                          [](const Model& m, const double* q, const double* v, double* out) {
                             std::fill(out, out + m.nv(), 0.0);
                             add_passive_forces(m, q, v, out);
                           });
@@ -67,8 +65,7 @@ void bind_kinematics(nb::module_& m) {
       "kinetic_energy",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
         return map_states(self, q, v, threads, {},
-                          [](Scratch& scratch, const double* q, const double* v, double* out) {
-                            const Model& m = scratch.model();
+                          [](const Model& m, const double* q, const double* v, double* out) {
                             *out = kinetic_energy(m, q, v);
                           });
       },
@@ -78,8 +75,7 @@ void bind_kinematics(nb::module_& m) {
       "potential_energy",
       [](const PyModel& self, nb::handle q, nb::handle threads) {
         return map_states(self, q, nb::none(), threads, {},
-                          [](Scratch& scratch, const double* q, const double*, double* out) {
-                            const Model& m = scratch.model();
+                          [](const Model& m, const double* q, const double*, double* out) {
                             *out = potential_energy(m, q);
                           });
       },
@@ -89,8 +85,7 @@ void bind_kinematics(nb::module_& m) {
       "momentum",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
         return map_states(self, q, v, threads, {6},
-                          [](Scratch& scratch, const double* q, const double* v, double* out) {
-                            const Model& m = scratch.model();
+                          [](const Model& m, const double* q, const double* v, double* out) {
                             momentum(m, q, v, out);
                           });
       },
@@ -101,8 +96,7 @@ void bind_kinematics(nb::module_& m) {
       "body_poses",
       [](const PyModel& self, nb::handle q, nb::handle threads) {
         return map_states(self, q, nb::none(), threads, {size(self.model->n_joints()), 4, 4},
-                          [](Scratch& scratch, const double* q, const double*, double* out) {
-                            const Model& m = scratch.model();
+                          [](const Model& m, const double* q, const double*, double* out) {
                             body_poses(m, q, out);
                           });
       },
@@ -113,8 +107,7 @@ void bind_kinematics(nb::module_& m) {
       "link_poses",
       [](const PyModel& self, nb::handle q, nb::handle threads) {
         return map_states(self, q, nb::none(), threads, {self.model->links.size(), 4, 4},
-                          [](Scratch& scratch, const double* q, const double*, double* out) {
-                            const Model& m = scratch.model();
+                          [](const Model& m, const double* q, const double*, double* out) {
                             link_poses(m, q, out);
                           });
       },
@@ -140,8 +133,7 @@ void bind_kinematics(nb::module_& m) {
                              std::to_string(self.model->n_joints()) + " bodies");
         }
         return map_states(self, q, nb::none(), threads, {6, size(self.model->nv())},
-                          [joint](Scratch& scratch, const double* q, const double*, double* out) {
-                            const Model& m = scratch.model();
+                          [joint](const Model& m, const double* q, const double*, double* out) {
                             body_jacobian(m, q, joint, out);
                           });
       },

@@ -1,174 +1,137 @@
-#include <set>
-
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
 #include "bind.hpp"
 #include "interrupt.hpp"
 #include "linkwise/exec/thread_pool.hpp"
-#include "linkwise/solve/registry.hpp"
+#include "linkwise/simulate/numerics.hpp"
 #include "py_simulation.hpp"
+#include "samples.hpp"
 #include "solver_options.hpp"
 
 namespace linkwise::bindings {
 namespace {
 
-nb::dict advance(PySimulation& self, nb::handle times_in, const nb::object& quantities) {
+/// Writes the samples at times; fewer where the simulation ends before.
+nb::dict advance(PySimulation& self, nb::handle times_in, nb::handle quantities) {
   Simulation& simulation = self.simulation;
-  const Model* model = self.model.get();
   const ArrayIn times = as_array(times_in, "times");
   const size_t n = times.size();
-  const size_t nq = model->nq(), nv = model->nv(), nj = model->n_joints();
-  std::set<std::string> wanted;
-  if (quantities.is_none())
-    wanted = {"position", "velocity", "acceleration", "joint_load", "drive_torque", "energy"};
-  else
-    for (nb::handle item : quantities) wanted.insert(nb::cast<std::string>(item));
-  const auto column = [&](const char* name, const Shape& tail) -> std::unique_ptr<NewArray> {
-    if (!wanted.count(name)) return nullptr;
-    Shape lead{n};
-    return std::make_unique<NewArray>(lead, tail);
-  };
-  auto position = column("position", {nq}), velocity = column("velocity", {nv}),
-       acceleration = column("acceleration", {nv});
-  auto load = column("joint_load", {nj, 6}), torque = column("drive_torque", {nv});
-  auto external = column("external_wrench", {nj, 6});
-  auto kinetic = column("energy", {}), potential = column("energy", {});
-  std::vector<std::array<double, 5>> statistics;
+  const Columns columns(*self.model, {n}, quantities);
   size_t done = 0;
-  bool interrupted = false;
   Interrupt interrupt;
   simulation.set_interrupt([&interrupt] { return interrupt(); });
   try {
     const nb::gil_scoped_release release;
-    for (; done < n; ++done) {
-      Sample s;
-      const auto row = [&](const std::unique_ptr<NewArray>& a, size_t width) {
-        return a ? a->data + done * width : nullptr;
-      };
-      s.position = row(position, nq);
-      s.velocity = row(velocity, nv);
-      s.acceleration = row(acceleration, nv);
-      s.joint_load = row(load, 6 * nj);
-      s.drive_torque = row(torque, nv);
-      s.external = row(external, 6 * nj);
-      s.kinetic_energy = row(kinetic, 1);
-      s.potential_energy = row(potential, 1);
-      if (!simulation.advance(times.data()[done], s)) break;
-      const SimulationStatistics st = simulation.statistics();
-      statistics.push_back({double(st.steps), double(st.evaluations), double(st.iterations),
-                            st.last_step, double(st.last_order)});
-    }
+    while (done < n &&
+           simulation.advance(times.data()[done], columns.sample.at(*self.model, 0, done)))
+      ++done;
   } catch (nb::python_error& error) {  // from a function of the user's
     if (!error.matches(PyExc_KeyboardInterrupt)) throw;
-    interrupted = true;
+    simulation.stop(Outcome::interrupted);
   }
-  interrupted |= interrupt.was_keyboard();
-  const nb::slice head(nb::int_(0), nb::int_(done), nb::int_(1));
-  nb::dict out;
-  const auto put = [&](const char* name, const std::unique_ptr<NewArray>& a) {
-    if (a) out[name] = nb::cast(a->array)[head];
-  };
-  const std::vector<double> reached(times.data(), times.data() + done);
-  out["time"] = to_numpy(reached);
-  put("position", position);
-  put("velocity", velocity);
-  put("acceleration", acceleration);
-  put("joint_load", load);
-  put("drive_torque", torque);
-  put("external_wrench", external);
-  put("kinetic_energy", kinetic);
-  put("potential_energy", potential);
-  const char* names[5] = {"steps", "evaluations", "iterations", "step_size", "order"};
-  for (int k = 0; k < 5; ++k) {
-    std::vector<double> values;
-    for (const auto& row : statistics) values.push_back(row[k]);
-    nb::object array = nb::cast(to_numpy(values));
-    out[names[k]] = k == 3 ? array : nb::object(array.attr("astype")("int64"));
-  }
-  const Ending& stop = simulation.ending();
-  out["outcome"] = std::string(to_string(interrupted ? Outcome::interrupted : stop.outcome));
-  out["stop_time"] = stop.ok() ? (done ? times.data()[done - 1] : 0.0) : stop.time;
-  out["stop_joint"] =
-      stop.joint >= 0 ? nb::object(nb::cast(model->joints[stop.joint].name)) : nb::none();
-  out["message"] = stop.text;
+  simulation.set_interrupt(nullptr);
+  interrupt.was_keyboard();
+  nb::dict out = columns.to_python(done);
+  out["time"] = to_numpy({times.data(), times.data() + done});
   return out;
 }
 
 nb::dict trace_columns(const std::vector<EvaluationTrace>& trace) {
-  std::vector<double> time, seconds, iterations, accepted;
-  for (const EvaluationTrace& row : trace) {
-    time.push_back(row.time);
-    seconds.push_back(row.seconds);
-    iterations.push_back(row.iterations);
-    accepted.push_back(row.accepted);
+  const Shape lead{trace.size()};
+  NewArray time(lead), seconds(lead);
+  nb::list iterations, accepted;
+  for (size_t i = 0; i < trace.size(); ++i) {
+    time.data[i] = trace[i].time;
+    seconds.data[i] = trace[i].seconds;
+    iterations.append(trace[i].iterations);
+    accepted.append(trace[i].accepted);
   }
   nb::dict out;
-  out["time"] = to_numpy(time);
-  out["seconds"] = to_numpy(seconds);
-  out["iterations"] = nb::cast(to_numpy(iterations)).attr("astype")("int64");
-  out["accepted"] = nb::cast(to_numpy(accepted)).attr("astype")("bool");
+  out["time"] = time.array;
+  out["seconds"] = seconds.array;
+  out["iterations"] = numpy("array")(iterations, "dtype"_a = "int64");
+  out["accepted"] = numpy("array")(accepted, "dtype"_a = "bool");
   return out;
 }
 
-SimulationOptions options_of(const std::string& method, const std::string& solver,
-                             const std::string& guess, const std::string& stop,
-                             nb::handle solver_tolerance, nb::handle max_iterations,
-                             nb::handle solver_options, const std::string& state,
-                             const std::string& integrator, double tolerance,
-                             nb::handle step_tolerance, nb::handle step, nb::handle max_step,
-                             int threads) {
-  SimulationOptions o;
-  o.dynamics.threads = checked_threads(threads);
-  if (!(tolerance > 0) || !std::isfinite(tolerance))
-    throw InputError("tolerance must be a positive number; 1e-6 is usual");
-  const double allowed_a_step =
-      step_tolerance.is_none() ? step_share * tolerance : nb::cast<double>(step_tolerance);
-  if (!(allowed_a_step > 0) || !std::isfinite(allowed_a_step))
-    throw InputError("step_tolerance must be a positive number; a tenth of tolerance is usual");
-  o.dynamics.method = method;
-  o.dynamics.solver = solver;
-  o.dynamics.initial_guess = guess;
-  o.dynamics.solver_options.stop = stop_rule_from_name(stop);
-  // The constraint forces perturb the accelerations by as much: a tenth of the step's error
-  // [sharf1993].
-  o.dynamics.solver_options.tolerance =
-      solver_tolerance.is_none() ? allowed_a_step / 10 : nb::cast<double>(solver_tolerance);
-  if (!max_iterations.is_none())
-    o.dynamics.solver_options.max_iterations = nb::cast<int>(max_iterations);
-  read_solver_options(solver_options, o.dynamics);
-  o.follow_error_test = solver_tolerance.is_none() && !gives_tolerance(solver_options);
-  o.state = state_choice_from_name(state);
-  o.integrator = find_integrator(integrator).kind;
-  o.integration.tolerance = allowed_a_step;
-  if (!step.is_none()) o.integration.step = nb::cast<double>(step);
-  if (!max_step.is_none()) o.integration.max_step = nb::cast<double>(max_step);
-  return o;
+/// Options by the names of the table, and solver_options and threads.
+SimulationOptions options_of(const nb::kwargs& given) {
+  Numerics numerics;
+  nb::object solver_options = nb::none(), threads = nb::none();
+  for (auto [key, value] : given) {
+    const std::string name = nb::cast<std::string>(key);
+    if (name == "solver_options") {
+      solver_options = nb::borrow(value);
+    } else if (name == "threads") {
+      threads = nb::borrow(value);
+    } else {
+      std::visit(
+          [&, value = value](auto member) {
+            using Value = std::remove_reference_t<decltype(numerics.*member)>;
+            if (!nb::try_cast(value, numerics.*member))
+              throw InputError(
+                  name + " is " + nb::cast<std::string>(nb::repr(value)) + "; give " +
+                  (std::is_same_v<Value, std::string> ? "a name in quotes" : "a number"));
+          },
+          find_numerics(name).member);
+    }
+  }
+  SimulationOptions options = simulation_options(numerics, threads_of(threads, 1 << 20));
+  read_solver_options(solver_options, options.dynamics);
+  options.follow_error_test &= !gives_tolerance(solver_options);
+  return options;
 }
 
-}  // namespace
+nb::list numerics_list() {
+  nb::list out;
+  const Numerics defaults;
+  for (const NumericsEntry& entry : numerics_table()) {
+    nb::dict row;
+    row["name"] = std::string(entry.name);
+    std::visit([&](auto member) { row["default"] = nb::cast(defaults.*member); }, entry.member);
+    row["description"] = std::string(entry.description);
+    out.append(row);
+  }
+  return out;
+}
 
-void bind_simulation(nb::module_& m) {
-  nb::class_<PySimulation>(m, "Simulation", "The compiled time loop behind linkwise.simulate.")
-      .def(
-          "__init__",
-          [](PySimulation* self, const PyModel& model, const std::string& method,
-             const std::string& solver, const std::string& guess, const std::string& stop,
-             nb::object solver_tolerance, nb::object max_iterations, nb::object solver_options,
-             const std::string& state, const std::string& integrator, double tolerance,
-             nb::object step_tolerance, nb::object step, nb::object max_step, nb::object threads) {
-            new (self) PySimulation(
-                model, options_of(method, solver, guess, stop, solver_tolerance, max_iterations,
-                                  solver_options, state, integrator, tolerance, step_tolerance,
-                                  step, max_step, threads_of(threads, 1 << 20)));
-          },
-          "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto",
-          "initial_guess"_a = "cubic", "stop"_a = "energy_norm", "solver_tolerance"_a = nb::none(),
-          "max_iterations"_a = nb::none(), "solver_options"_a = nb::none(),
-          "state"_a = "joint_rates", "integrator"_a = "adams", "tolerance"_a = 1e-6,
-          "step_tolerance"_a = nb::none(), "step"_a = nb::none(), "max_step"_a = nb::none(),
-          "threads"_a = nb::none())
-      .def("drive_torque", &PySimulation::torque, "joint"_a, "values"_a)
+nb::list quantity_list() {
+  nb::list out;
+  for (const QuantityEntry& entry : quantity_table()) {
+    nb::dict row;
+    const auto text = [&](const char* key, std::string_view value) {
+      row[key] = std::string(value);
+    };
+    text("name", entry.name);
+    text("group", entry.group);
+    text("axis", to_string(entry.axis));
+    text("units", entry.units);
+    text("long_name", entry.long_name);
+    text("frame", entry.frame);
+    text("point", entry.point);
+    text("convention", entry.convention);
+    row["is_count"] = entry.count != nullptr;
+    row["of_members"] = entry.of_members;
+    out.append(row);
+  }
+  return out;
+}
+
+void bind_ending(nb::module_& m) {
+  nb::class_<Ending>(m, "Ending", "How a simulation ended, or that it goes on (converged).")
+      .def_prop_ro("outcome", [](const Ending& e) { return std::string(to_string(e.outcome)); })
+      .def_ro("time", &Ending::time, "The time that was reached, s.")
+      .def_ro("text", &Ending::text, "What happened and what to do about it, or empty.");
+  nb::class_<SimulationStatistics>(m, "SimulationStatistics", "Since the start.")
+      .def_ro("steps", &SimulationStatistics::steps)
+      .def_ro("evaluations", &SimulationStatistics::evaluations)
+      .def_ro("iterations", &SimulationStatistics::iterations);
+}
+
+void bind_drives(nb::class_<PySimulation>& simulation) {
+  simulation.def("drive_torque", &PySimulation::torque, "joint"_a, "values"_a)
       .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a,
            "interpolation"_a = "linear")
       .def("drive_torque_callable", &PySimulation::torque_callable, "joint"_a, "fn"_a)
@@ -178,43 +141,45 @@ void bind_simulation(nb::module_& m) {
       .def("drive_pd", &PySimulation::pd, "joint"_a, "kp"_a, "kd"_a, "target"_a)
       .def("drive_pd_table", &PySimulation::pd_table, "joint"_a, "kp"_a, "kd"_a, "times"_a,
            "values"_a, "interpolation"_a = "linear")
+      .def("drive_locked", &PySimulation::locked, "joint"_a)
+      .def("drive_free", &PySimulation::free, "joint"_a)
+      .def("wrench", &PySimulation::wrench, "body"_a, "value"_a, "frame"_a = "world")
+      .def("wrench_table", &PySimulation::wrench_table, "body"_a, "times"_a, "values"_a,
+           "interpolation"_a = "linear", "frame"_a = "world")
+      .def("wrench_callable", &PySimulation::wrench_callable, "body"_a, "fn"_a,
+           "frame"_a = "world");
+}
+
+}  // namespace
+
+void bind_simulation(nb::module_& m) {
+  bind_ending(m);
+  nb::class_<PySimulation> simulation(
+      m, "Simulation",
+      "The compiled time loop behind linkwise.simulate: Simulation(model, **options), options by "
+      "the names of\n"
+      "numerics(), and solver_options and threads.");
+  simulation
       .def(
-          "drive_locked",
-          [](PySimulation& s, const std::string& j) { s.set_kind(j, DriveKind::locked); },
-          "joint"_a)
-      .def(
-          "drive_free",
-          [](PySimulation& s, const std::string& j) { s.set_kind(j, DriveKind::free); }, "joint"_a)
-      .def(
-          "wrench",
-          [](PySimulation& s, const std::string& body, nb::object value, const std::string& frame) {
-            Wrench w = s.wrench_on(body, frame);
-            w.value = constants(value, "wrench", 6);
-            s.simulation.add_wrench(std::move(w));
+          "__init__",
+          [](PySimulation* self, const PyModel& model, const nb::kwargs& options) {
+            new (self) PySimulation(model, options_of(options));
           },
-          "body"_a, "value"_a, "frame"_a = "world")
-      .def(
-          "wrench_table",
-          [](PySimulation& s, const std::string& body, nb::object times, nb::object values,
-             const std::string& interpolation, const std::string& frame) {
-            Wrench w = s.wrench_on(body, frame);
-            w.table = make_table(times, values, interpolation, 6);
-            s.simulation.add_wrench(std::move(w));
-          },
-          "body"_a, "times"_a, "values"_a, "interpolation"_a = "linear", "frame"_a = "world")
-      .def(
-          "wrench_callable",
-          [](PySimulation& s, const std::string& body, nb::callable fn, const std::string& frame) {
-            Wrench w = s.wrench_on(body, frame);
-            w.callable = [fn, body](double t, double* out) {
-              const nb::gil_scoped_acquire acquire;
-              store(fn(t), "wrench returned for body '" + body + "'", out, 6);
-            };
-            s.simulation.add_wrench(std::move(w));
-          },
-          "body"_a, "fn"_a, "frame"_a = "world")
+          "model"_a, "options"_a)
       .def("start", &PySimulation::start, "t0"_a, "q0"_a, "v0"_a)
-      .def("advance", &advance, "times"_a, "quantities"_a = nb::none())
+      .def("advance", &advance, "times"_a, "quantities"_a = nb::none(),
+           "The samples at times [s], which increase: a dictionary of the time and of the arrays "
+           "(time, ...) of\n"
+           "the wanted quantities. Fewer where the simulation ends before: see ending.")
+      .def_prop_ro("ending", [](const PySimulation& s) { return s.simulation.ending(); })
+      .def_prop_ro(
+          "stop_joint",
+          [](const PySimulation& s) {
+            const int joint = s.simulation.ending().joint;
+            return joint < 0 ? std::string() : s.model->joints[joint].name;
+          },
+          "The joint where it failed, or empty.")
+      .def_prop_ro("statistics", [](const PySimulation& s) { return s.simulation.statistics(); })
       .def(
           "keep_trace", [](PySimulation& s, bool wanted) { s.simulation.keep_trace(wanted); },
           "wanted"_a = true,
@@ -222,17 +187,23 @@ void bind_simulation(nb::module_& m) {
       .def(
           "trace", [](const PySimulation& s) { return trace_columns(s.simulation.trace()); },
           "The evaluations so far, one array entry each: simulated time, seconds spent, "
-          "iterations, "
-          "and whether the step that it ended was accepted.")
+          "iterations, and whether the step that it ended was accepted.")
       .def_prop_ro(
           "velocity_drift", [](const PySimulation& s) { return s.simulation.velocity_drift(); },
           "State body_velocities: how far joints come apart at the last sample, m/s or rad/s.")
       .def_prop_ro(
           "step_tolerance",
-          [](const PySimulation& s) { return s.simulation.options().integration.tolerance; })
-      .def_prop_ro("method", [](const PySimulation& s) { return s.simulation.choice().method; })
-      .def_prop_ro("solver", [](const PySimulation& s) { return s.simulation.choice().solver; })
-      .def_prop_ro("reason", [](const PySimulation& s) { return s.simulation.choice().reason; });
+          [](const PySimulation& s) { return s.simulation.setup().options.integration.tolerance; })
+      .def_prop_ro("method",
+                   [](const PySimulation& s) { return s.simulation.setup().choice.method; })
+      .def_prop_ro("solver",
+                   [](const PySimulation& s) { return s.simulation.setup().choice.solver; })
+      .def_prop_ro("reason",
+                   [](const PySimulation& s) { return s.simulation.setup().choice.reason; });
+  bind_drives(simulation);
+  m.def("numerics", &numerics_list,
+        "The options of Simulation, as dictionaries of name, default and description.");
+  m.def("quantities", &quantity_list, "The table of recorded quantities, as dictionaries.");
 }
 
 }  // namespace linkwise::bindings

@@ -68,15 +68,7 @@ struct StateRows {
 };
 
 PyReport to_python(const Model& m, const Choice& choice, const Report& r, int body) {
-  PyReport out;
-  out.outcome = to_string(r.outcome);
-  out.method = choice.method;
-  out.solver = choice.solver;
-  out.reason = choice.reason;
-  out.body = body >= 0 ? m.body_name(body) : "";
-  out.iterations = r.iterations;
-  out.error_estimate = r.error_estimate;
-  return out;
+  return {m, {r.outcome, choice, body, r.iterations, r.error_estimate}};
 }
 
 /// A f = b of a model at one state. Holds its own copy of the state.

@@ -6,75 +6,6 @@
 
 namespace linkwise::bindings {
 
-/// Values over time as piecewise polynomials; cubic ones are SciPy's not-a-knot splines.
-inline Table make_table(nb::handle times, nb::handle values, const std::string& interpolation,
-                        size_t columns) {
-  const ArrayIn t = as_array(times, "times");
-  const ArrayIn y = as_array(values, "values");
-  if (t.ndim() != 1 || t.shape(0) < 2)
-    throw InputError("times has shape " + shape_text(shape_of(t)) +
-                     "; a table needs at least two times");
-  const size_t n = t.shape(0);
-  const bool flat = y.ndim() == 1 && columns == 1;
-  if (!flat && (y.ndim() != 2 || y.shape(1) != columns))
-    throw InputError("values has shape " + shape_text(shape_of(y)) + " but shape (" +
-                     std::to_string(n) + ", " + std::to_string(columns) + ") is expected");
-  if (y.shape(0) != n)
-    throw InputError("values has " + std::to_string(y.shape(0)) + " rows but there are " +
-                     std::to_string(n) + " times");
-  for (size_t i = 0; i < n * columns; ++i)
-    if (!std::isfinite(y.data()[i]))
-      throw InputError("values is not finite in row " + std::to_string(i / columns));
-  for (size_t i = 0; i < n; ++i)
-    if (!std::isfinite(t.data()[i]) || (i > 0 && !(t.data()[i] > t.data()[i - 1])))
-      throw InputError("times is not increasing at row " + std::to_string(i) +
-                       "; sort the table by time and remove repeated times");
-  Table table;
-  table.breaks.assign(t.data(), t.data() + n);
-  table.columns = static_cast<int>(columns);
-  if (interpolation == "linear") {
-    table.degree = 1;
-    for (size_t i = 0; i + 1 < n; ++i) {
-      for (size_t c = 0; c < columns; ++c)
-        table.coefficients.push_back((y.data()[(i + 1) * columns + c] - y.data()[i * columns + c]) /
-                                     (t.data()[i + 1] - t.data()[i]));
-      for (size_t c = 0; c < columns; ++c) table.coefficients.push_back(y.data()[i * columns + c]);
-    }
-    return table;
-  }
-  if (interpolation != "cubic")
-    throw InputError("interpolation '" + interpolation + "' is unknown; known: linear, cubic");
-  table.degree = 3;
-  const nb::object rows = numpy("reshape")(y.object(), nb::make_tuple(n, columns));
-  const nb::object spline =
-      nb::module_::import_("scipy.interpolate").attr("CubicSpline")(t.object(), rows);
-  const ArrayIn c =
-      as_array(numpy("transpose")(spline.attr("c"), nb::make_tuple(1, 0, 2)), "coefficients");
-  table.coefficients.assign(c.data(), c.data() + c.size());
-  return table;
-}
-
-inline std::vector<double> constants(nb::handle value, const char* name, size_t n) {
-  const ArrayIn a = as_array(value, name);
-  if (a.size() != n && a.size() != 1)
-    throw InputError(std::string(name) + " has shape " + shape_text(shape_of(a)) + " but shape (" +
-                     std::to_string(n) + ",) is expected");
-  std::vector<double> out(n);
-  for (size_t i = 0; i < n; ++i) {
-    out[i] = a.data()[a.size() == 1 ? 0 : i];
-    if (!std::isfinite(out[i]))
-      throw InputError(std::string(name) + " is not finite; give finite numbers");
-  }
-  return out;
-}
-
-inline nb::object copy_of(const double* x, int n) { return nb::cast(to_numpy({x, x + n})); }
-
-inline void store(nb::handle result, const std::string& who, double* out, size_t n) {
-  const std::vector<double> values = constants(result, who.c_str(), n);
-  std::copy(values.begin(), values.end(), out);
-}
-
 class PySimulation {
  public:
   PySimulation(const PyModel& owner, SimulationOptions options)
@@ -83,118 +14,27 @@ class PySimulation {
   std::shared_ptr<const Model> model;
   Simulation simulation;
 
-  int joint(const std::string& name) const { return model->joint_index(name); }
-  size_t width(int j) const { return model->joints[j].nv; }
+  void torque(const std::string& joint, nb::handle values);
+  void torque_table(const std::string& joint, nb::handle times, nb::handle values,
+                    const std::string& interpolation);
+  void torque_callable(const std::string& joint, nb::callable fn);
+  void motion_table(const std::string& joint, nb::handle times, nb::handle values,
+                    const std::string& interpolation);
+  void motion_callable(const std::string& joint, nb::callable fn);
+  void pd(const std::string& joint, double kp, double kd, nb::handle target);
+  void pd_table(const std::string& joint, double kp, double kd, nb::handle times, nb::handle values,
+                const std::string& interpolation);
+  void locked(const std::string& joint);
+  void free(const std::string& joint);
+  void wrench(const std::string& body, nb::handle value, const std::string& frame);
+  void wrench_table(const std::string& body, nb::handle times, nb::handle values,
+                    const std::string& interpolation, const std::string& frame);
+  void wrench_callable(const std::string& body, nb::callable fn, const std::string& frame);
+  void start(double t0, nb::handle q, nb::handle v);
 
-  void torque(const std::string& name, nb::handle values) {
-    const int j = joint(name);
-    Drive d;
-    d.kind = DriveKind::torque;
-    d.value = constants(values, ("torque of joint '" + name + "'").c_str(), width(j));
-    simulation.set_drive(j, std::move(d));
-  }
-  void torque_table(const std::string& name, nb::handle times, nb::handle values,
-                    const std::string& interpolation) {
-    const int j = joint(name);
-    Drive d;
-    d.kind = DriveKind::torque_table;
-    d.table = make_table(times, values, interpolation, width(j));
-    simulation.set_drive(j, std::move(d));
-  }
-  void torque_callable(const std::string& name, nb::callable fn) {
-    const int j = joint(name);
-    const JointInfo& info = model->joints[j];
-    Drive d;
-    d.kind = DriveKind::torque_callable;
-    d.callable = [fn, name, nq = info.nq, nv = info.nv](double t, const double* q, const double* v,
-                                                        double* out) {
-      const nb::gil_scoped_acquire acquire;
-      store(fn(t, copy_of(q, nq), copy_of(v, nv)), "torque returned for joint '" + name + "'", out,
-            nv);
-    };
-    simulation.set_drive(j, std::move(d));
-  }
-  void motion_table(const std::string& name, nb::handle times, nb::handle values,
-                    const std::string& interpolation) {
-    const int j = joint(name);
-    if (interpolation == "linear")
-      throw InputError("joint '" + name +
-                       "': the velocity of a linear table jumps at every row; use cubic");
-    Drive d;
-    d.kind = DriveKind::motion;
-    d.table = make_table(times, values, interpolation, width(j));
-    simulation.set_drive(j, std::move(d));
-  }
-  void motion_callable(const std::string& name, nb::callable fn) {
-    const int j = joint(name);
-    Drive d;
-    d.kind = DriveKind::motion;
-    d.motion = [fn, name, nv = width(j)](double t, double* q, double* v, double* a) {
-      const nb::gil_scoped_acquire acquire;
-      const nb::object returned = fn(t);
-      if (!nb::isinstance<nb::sequence>(returned) || nb::len(returned) != 3)
-        throw InputError("motion returned for joint '" + name +
-                         "' is not three values; return position, rate and acceleration");
-      double* out[3] = {q, v, a};
-      const char* what[3] = {"position", "rate", "acceleration"};
-      for (int k = 0; k < 3; ++k)
-        store(returned[k], std::string(what[k]) + " returned for joint '" + name + "'", out[k], nv);
-    };
-    simulation.set_drive(j, std::move(d));
-  }
-  void pd(const std::string& name, double kp, double kd, nb::handle target) {
-    const int j = joint(name);
-    Drive d = gains(name, kp, kd);
-    d.value = constants(target, ("target of joint '" + name + "'").c_str(), width(j));
-    simulation.set_drive(j, std::move(d));
-  }
-  void pd_table(const std::string& name, double kp, double kd, nb::handle times, nb::handle values,
-                const std::string& interpolation) {
-    const int j = joint(name);
-    Drive d = gains(name, kp, kd);
-    d.table = make_table(times, values, interpolation, width(j));
-    simulation.set_drive(j, std::move(d));
-  }
-  Drive gains(const std::string& name, double kp, double kd) const {
-    if (!(kp >= 0) || !(kd >= 0) || !std::isfinite(kp + kd))
-      throw InputError("joint '" + name + "': gains kp and kd must be finite and >= 0");
-    Drive d;
-    d.kind = DriveKind::pd;
-    d.kp = kp;
-    d.kd = kd;
-    return d;
-  }
-  void set_kind(const std::string& name, DriveKind kind) {
-    Drive d;
-    d.kind = kind;
-    simulation.set_drive(joint(name), std::move(d));
-  }
-
-  Wrench wrench_on(const std::string& body, const std::string& frame) const {
-    if (frame != "world" && frame != "body")
-      throw InputError("frame '" + frame + "' is unknown; known: world, body");
-    const LinkInfo& link = model->links[model->link_index(body)];
-    if (link.joint < 0 || model->links[model->joints[link.joint].link].name != body)
-      throw InputError("link '" + body + "'" + model->where() +
-                       " is welded to another; apply the wrench to '" +
-                       (link.joint < 0 ? std::string("a moving body")
-                                       : model->links[model->joints[link.joint].link].name) +
-                       "'");
-    Wrench w;
-    w.joint = link.joint;
-    w.world = frame == "world";
-    return w;
-  }
-
-  void start(double t0, nb::handle q, nb::handle v) {
-    const Argument q0("q0", {static_cast<size_t>(model->nq())}, q),
-        v0("v0", {static_cast<size_t>(model->nv())}, v);
-    if (!q0.given || q0.array.ndim() != 1)
-      throw InputError("q0 must have shape (" + std::to_string(model->nq()) + ",)");
-    if (!v0.given || v0.array.ndim() != 1)
-      throw InputError("v0 must have shape (" + std::to_string(model->nv()) + ",)");
-    simulation.start(t0, q0.data, v0.data);
-  }
+ private:
+  void set(const std::string& joint, Drive drive);
+  size_t width(const std::string& joint) const;
 };
 
 }  // namespace linkwise::bindings

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "linkwise/dynamics/forward_dynamics.hpp"
+#include "linkwise/dynamics/evaluator.hpp"
 
 namespace linkwise::bindings {
 
@@ -11,19 +11,13 @@ struct NumericsError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-struct PyReport {
-  std::string outcome = "converged", method, solver, reason, body;
-  int iterations = 0;
-  double error_estimate = 0;
-};
+/// A report, and the name of the body at which it failed.
+struct PyReport : EvaluationReport {
+  std::string body_name;
 
-/// One line: what happened, where, and the remedy.
-inline std::string failure_text(const Model& m, const PyReport& report, Outcome outcome) {
-  return "method " + report.method +
-         (report.solver.empty() ? "" : " with solver " + report.solver) + ": " +
-         std::string(message(outcome)) +
-         (report.body.empty() ? "" : " at body '" + report.body + "'" + m.where()) + "; " +
-         std::string(remedy(outcome));
-}
+  PyReport() = default;
+  PyReport(const Model& model, EvaluationReport report)
+      : EvaluationReport(std::move(report)), body_name(body < 0 ? "" : model.body_name(body)) {}
+};
 
 }  // namespace linkwise::bindings

@@ -314,7 +314,10 @@ def runs() -> Iterator[tuple[str, Callable[[], lw.Run]]]:
 
 
 def simulated(build: Callable[[], lw.Model], **options: Any) -> lw.Run:
-    return lw.simulate(build(), threads=1, on_failure="return", **options)
+    rare = {key: options.pop(key) for key in ("initial_guess", "state") if key in options}
+    if hasattr(lw, "Numerics"):  # older builds take them as arguments
+        rare = {"numerics": lw.Numerics(**rare)}
+    return lw.simulate(build(), threads=1, on_failure="return", **options, **rare)
 
 
 def scenario(path: Path) -> lw.Run:

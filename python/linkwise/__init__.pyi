@@ -27,6 +27,7 @@ from linkwise._core import link_poses as link_poses
 from linkwise._core import mass_matrix as mass_matrix
 from linkwise._core import methods as methods
 from linkwise._core import momentum as momentum
+from linkwise._core import numerics as numerics
 from linkwise._core import passive_torque as passive_torque
 from linkwise._core import potential_energy as potential_energy
 from linkwise._core import solver_options as solver_options
@@ -46,6 +47,7 @@ from linkwise.results import Run as Run
 from linkwise.results import open_run as open_run
 from linkwise.scenario import load_scenario as load_scenario
 from linkwise.simulation.batch import simulate_batch as simulate_batch
+from linkwise.simulation.numerics import Numerics as Numerics
 from linkwise.simulation.simulate import SimulationError as SimulationError
 from linkwise.simulation.simulate import SimulationInterrupted as SimulationInterrupted
 from linkwise.simulation.simulate import run_scenario as run_scenario

@@ -100,14 +100,10 @@ def free_trajectory(model: Model, states: int, seed: int) -> Trajectory:
 
 def driven_trajectory(model: Model, arguments: Mapping[str, Any], states: int) -> Trajectory:
     """The motion of a scenario, as `Scenario.simulate_arguments` describes it, to its middle."""
+    options = arguments["numerics"]
+    kept = ("integrator", "tolerance", "step_tolerance", "step", "max_step")
     simulation = _core.Simulation(
-        model,
-        method=REFERENCE,
-        integrator=arguments.get("integrator", "adams"),
-        tolerance=arguments.get("tolerance", 1e-6),
-        step_tolerance=arguments.get("step_tolerance"),
-        step=arguments.get("step"),
-        max_step=arguments.get("max_step"),
+        model, method=REFERENCE, **{name: options[name] for name in kept if name in options}
     )
     for joint, drive in (arguments.get("drives") or {}).items():
         as_drive(drive).apply(simulation, joint)
@@ -159,10 +155,10 @@ def _record(
     step, time = duration / _FIRST_CALL, 0.0
     while time < duration:
         time = min(duration, time + step)
-        reached = simulation.advance([time], ())
+        simulation.advance([time], ())
         spent = clock.monotonic() - started
-        taken = int(reached["steps"][-1]) if len(reached["steps"]) else 0
-        if reached["outcome"] != "converged" or spent > _RUN_LIMIT or taken > most_steps(wanted):
+        taken, ending = simulation.statistics.steps, simulation.ending
+        if ending.outcome != "converged" or spent > _RUN_LIMIT or taken > most_steps(wanted):
             break
         if spent < _RUN_LIMIT / 10:
             step *= 2
@@ -171,7 +167,7 @@ def _record(
     if end == 0:
         raise InputError(
             f"compare: the motion of {model.name!r} ends at once "
-            f"({reached['outcome']}: {reached['message']}); give another state or scenario"
+            f"({ending.outcome}: {ending.text}); give another state or scenario"
         )
     times = np.unique(trace["time"][trace["accepted"]])
     times = times[(times > 0) & (times <= end)][-wanted:]

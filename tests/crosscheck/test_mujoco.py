@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 
 import linkwise as lw
 from helpers.compare import assert_close
+from helpers.methods import METHODS
 from helpers.random_trees import random_configuration
 
 mujoco = pytest.importorskip("mujoco")
 
 MODELS = sorted((Path(__file__).parents[1] / "data" / "mjcf").glob("*.xml"))
 STATES = 20
-METHODS = ("articulated_body", "composite_rigid_body", "constraint_force")
 
 
 class Reference:

@@ -12,17 +12,12 @@ import pytest
 
 import linkwise as lw
 from helpers.compare import assert_close, load_error
+from helpers.methods import METHODS
 from helpers.pinocchio_pair import Pair, robot_files
 from helpers.random_trees import random_configuration
 
 STATES = 20
 TOLERANCE = 1e-9
-METHODS = {
-    "articulated_body": {},
-    "composite_rigid_body": {},
-    "constraint_force": {"solver": "thomas"},
-    "global_projection": {},
-}
 ROBOTS = robot_files()
 
 # Files that cannot be simulated, with the words that our message must contain.
@@ -112,7 +107,7 @@ def test_joint_order_of_pinocchio(name):
 @pytest.mark.parametrize("method", METHODS)
 def test_accelerations_and_joint_loads(robot, method):
     name, model, q, v, a, ref = robot
-    options = {"method": method, **METHODS[method]}
+    options = {"method": method}
     if method == "constraint_force" and name in SINGULAR:
         with pytest.raises(lw.InputError, match="singular") as error:
             lw.forward_dynamics(model, q, v, ref["tau"], **options)

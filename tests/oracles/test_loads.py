@@ -6,10 +6,9 @@ import pytest
 import linkwise as lw
 from helpers.compare import load_error
 from helpers.machines import G, pendulum, rod_chain
+from helpers.methods import METHODS
 from helpers.motion import final_state
 from helpers.random_trees import random_configuration
-
-METHODS = ["articulated_body", "composite_rigid_body", "constraint_force"]
 
 
 @pytest.mark.parametrize("distance", [1.0, 0.6])

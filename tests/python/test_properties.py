@@ -10,15 +10,9 @@ from scipy.spatial.transform import Rotation
 
 import linkwise as lw
 from helpers.compare import assert_close, load_error
+from helpers.methods import METHODS
 from helpers.newton_euler import newton_euler
 from helpers.random_trees import random_configuration, random_rotation, trees
-
-METHODS = [
-    "articulated_body",
-    "composite_rigid_body",
-    "constraint_force",
-    "global_projection",
-]
 
 
 def state(tree, model):

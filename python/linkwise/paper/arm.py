@@ -123,7 +123,8 @@ def run_maneuver(
         times.append(clock.process_time() - started)
     trace = simulation.trace()
     iterations = trace["iterations"]
-    done = reached["outcome"] == "converged"
+    outcome = simulation.ending.outcome
+    done = outcome == "converged"
     miss = reached["position"][-1] - np.array(maneuver.end) if done else np.full(model.nq, np.nan)
     speed = reached["velocity"][-1] if done else miss
     way = np.abs(np.subtract(maneuver.end, maneuver.start)).max()
@@ -131,7 +132,7 @@ def run_maneuver(
         "method": solver if method == "constraint_force" else method,
         "maneuver": maneuver.name,
         "protocol": protocol.name,
-        "outcome": reached["outcome"],
+        "outcome": outcome,
         "mean_iterations": float(iterations.mean()),
         "max_iterations": int(iterations.max()),
         "seconds": min(times),
@@ -140,7 +141,7 @@ def run_maneuver(
         "weighted_final_error": weighted_norm(maneuver, miss, speed, protocol.tolerance),
         "accuracy_percent": float(100 * np.abs(miss).max() / way),
         "evaluations": int(iterations.size),
-        "steps": int(reached["steps"][-1]) if done else int(trace["accepted"].sum()),
+        "steps": simulation.statistics.steps if done else int(trace["accepted"].sum()),
     }
 
 

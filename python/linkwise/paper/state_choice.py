@@ -50,9 +50,9 @@ def _run(maneuver: Maneuver, solver: str, state: str) -> dict[str, Any]:
         "method": solver,
         "maneuver": maneuver.name,
         "state": state,
-        "outcome": reached["outcome"],
+        "outcome": simulation.ending.outcome,
         "final_error": float(miss.max()),
         # m/s or rad/s by which the joints' ends part, at most, along the maneuver.
         "greatest_drift": drift,
-        "evaluations": int(reached["evaluations"][-1]),
+        "evaluations": simulation.statistics.evaluations,
     }

@@ -13,70 +13,23 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
+from linkwise._core import quantities as recorded_quantities
 from linkwise.base import COMPONENTS, AnyArray
 from linkwise.record.labels import Scalars, joint_scalars, text_array
 
 if TYPE_CHECKING:
     from linkwise._core import Model
 
-QUANTITIES = (
-    "position",
-    "velocity",
-    "acceleration",
-    "joint_load",
-    "drive_torque",
-    "external_wrench",
-    "energy",
-    "statistics",
-)
+#: What the core records: name, group, axis, units and texts of every quantity.
+TABLE = recorded_quantities()
+QUANTITIES = tuple(dict.fromkeys(row["group"] for row in TABLE))
 
-_LOAD_ATTRS = {
-    "long_name": "joint load",
-    "units": "N, N m",
-    "frame": "joint frame, fixed in the outboard body",
-    "point": "joint point: the origin of the joint frame",
-    "convention": "wrench that the inboard body exerts on the outboard body through the joint",
-}
-_WRENCH_ATTRS = {
-    "long_name": "external wrench",
-    "units": "N (fx, fy, fz), N m (nx, ny, nz)",
-    "frame": "joint frame, fixed in the body",
-    "point": "origin of the joint frame",
-    "convention": "wrench that acts on the body from outside, by the wrenches of the simulation",
-}
-_SCALAR_ATTRS: dict[str, dict[str, str]] = {
-    "position": {
-        "long_name": "joint position",
-        "convention": "zero as in the model file; angles are not wrapped; "
-        "quaternions are x, y, z, w and take components in the joint frame to the inboard body's",
-    },
-    "velocity": {
-        "long_name": "joint velocity",
-        "frame": "of the outboard body relative to the inboard body; joints with more than one "
-        "degree of freedom: in the joint frame, linear components first",
-    },
-    "acceleration": {
-        "long_name": "joint acceleration",
-        "convention": "time derivative of velocity, component by component",
-    },
-    "drive_torque": {
-        "long_name": "drive torque or force",
-        "convention": "power into the mechanism is drive_torque * velocity",
-    },
-}
-_RATE_SUFFIX = {"velocity": "/s", "acceleration": "/s^2"}
-_ENERGY_ATTRS = {
-    "kinetic_energy": {"long_name": "kinetic energy", "units": "J"},
-    "potential_energy": {
-        "long_name": "potential energy of gravity and springs",
-        "units": "J",
-    },
-}
-_COUNTS = {
-    "steps": "accepted integration steps since the start",
-    "evaluations": "evaluations of the equations of motion since the start",
-    "iterations": "iterations of the linear solver since the start",
-}
+
+def _attrs(row: Mapping[str, Any]) -> dict[str, str]:
+    """The texts of a quantity; the units of joint coordinates are found per joint."""
+    keys = ("long_name", "units", "frame", "point", "convention")
+    per_joint = row["axis"] in ("coordinates", "rates")
+    return {key: row[key] for key in keys if row[key] and not (key == "units" and per_joint)}
 
 
 @dataclass(frozen=True)
@@ -97,8 +50,6 @@ class Variable:
     def rows(self, chunk: Mapping[str, Any], count: int) -> AnyArray:
         """This variable's rows of one chunk returned by `Simulation.advance`."""
         values = np.asarray(chunk[self.name])
-        if values.ndim == 0:  # a counter that the core reports once per chunk
-            values = np.full(count, values)
         if self.take is not None:
             values = values[:, self.take]
         return np.ascontiguousarray(values, dtype=self.dtype).reshape((count, *self.shape))
@@ -123,15 +74,7 @@ class Schema:
 
 
 # The order in which a dataset lists its variables.
-ORDER = (
-    *_SCALAR_ATTRS,
-    "joint_load",
-    "external_wrench",
-    *_ENERGY_ATTRS,
-    *_COUNTS,
-    "step_size",
-    "order",
-)
+ORDER = tuple(row["name"] for row in TABLE)
 TIME_ATTRS = {"long_name": "time", "units": "s"}
 
 
@@ -156,18 +99,25 @@ def resolve_joints(model: Model, joints: Sequence[str] | None) -> list[int]:
     return sorted({model.joint_index(name) for name in joints})
 
 
+def _dtype(row: Mapping[str, Any]) -> np.dtype[Any]:
+    return np.dtype(np.int64 if row["is_count"] else np.float64)
+
+
 def _scalar_variable(
-    name: str, dim: str, scalars: Scalars, whole: int, coordinates: dict[str, Coordinate]
+    row: Mapping[str, Any],
+    dim: str,
+    scalars: Scalars,
+    whole: int,
+    coordinates: dict[str, Coordinate],
 ) -> Variable:
     """A variable with one column per joint coordinate or velocity, and its units."""
-    attrs = dict(_SCALAR_ATTRS[name])
-    if name == "drive_torque":
+    name, attrs = row["name"], _attrs(row)
+    if row["units"] == "force":
         units = text_array(
             {"rad": "N m", "m": "N"}.get(u, "N m or N") for u in scalars.units.tolist()
         )
     else:
-        suffix = _RATE_SUFFIX.get(name, "")
-        units = text_array(u + suffix for u in scalars.units.tolist())
+        units = text_array(u + row["units"] for u in scalars.units.tolist())
     distinct = np.unique(units)
     if distinct.size == 1:
         attrs["units"] = str(distinct[0])
@@ -176,27 +126,18 @@ def _scalar_variable(
         coordinates[f"{name}_units"] = Coordinate((dim,), units)
     everything = np.array_equal(scalars.index, np.arange(whole))
     take = None if everything else scalars.index
-    shape = (int(scalars.index.size),)
-    return Variable(name, (dim,), shape, np.dtype(np.float64), attrs, take)
+    return Variable(name, (dim,), (int(scalars.index.size),), _dtype(row), attrs, take)
 
 
-def _statistics() -> list[Variable]:
-    count, real = np.dtype(np.int64), np.dtype(np.float64)
-    counters = [
-        Variable(name, (), (), count, {"long_name": text, "units": "1"})
-        for name, text in _COUNTS.items()
-    ]
-    step_size = {"long_name": "size of the last integration step", "units": "s"}
-    order = {"long_name": "order of the integration method in the last step", "units": "1"}
-    return [
-        *counters,
-        Variable("step_size", (), (), real, step_size),
-        Variable("order", (), (), count, order),
-    ]
+def _wrench_variable(row: Mapping[str, Any], dim: str, take: Sequence[int], all_: bool) -> Variable:
+    """A variable with six components for each of the joints or bodies `take`."""
+    kept = None if all_ else np.array(take, dtype=np.intp)
+    shape = (len(take), len(COMPONENTS))
+    return Variable(row["name"], (dim, "component"), shape, _dtype(row), _attrs(row), kept)
 
 
 def _joint_variables(
-    model: Model, kept: Sequence[str], selected: Sequence[int]
+    model: Model, rows: Sequence[Mapping[str, Any]], selected: Sequence[int]
 ) -> tuple[list[Variable], dict[str, Coordinate]]:
     """What is recorded per joint, coordinate or degree of freedom, with its labels."""
     positions, velocities = joint_scalars(model, selected)
@@ -207,25 +148,20 @@ def _joint_variables(
 
     coordinates: dict[str, Coordinate] = {}
     variables: list[Variable] = []
-    for name in ("position", "velocity", "acceleration", "drive_torque"):
-        if name in kept:
-            on_q = name == "position"
-            scalars, dim = (positions, q_dim) if on_q else (velocities, v_dim)
-            whole = model.nq if on_q else model.nv
-            variables.append(_scalar_variable(name, dim, scalars, whole, coordinates))
-            coordinates[dim] = Coordinate((dim,), scalars.labels)
-    if "joint_load" in kept:
-        take = None if len(selected) == model.n_joints else np.array(selected, dtype=np.intp)
-        shape = (len(selected), len(COMPONENTS))
-        real = np.dtype(np.float64)
-        variables.append(
-            Variable("joint_load", ("joint", "component"), shape, real, _LOAD_ATTRS, take)
-        )
-        coordinates["joint"] = Coordinate(("joint",), names)
-        coordinates["component"] = Coordinate(("component",), text_array(COMPONENTS))
-        coordinates["joint_load_units"] = Coordinate(
-            ("component",), text_array(["N"] * 3 + ["N m"] * 3)
-        )
+    for row in rows:
+        if row["axis"] == "joints":
+            everything = len(selected) == model.n_joints
+            variables.append(_wrench_variable(row, "joint", selected, everything))
+            coordinates["joint"] = Coordinate(("joint",), names)
+            coordinates["component"] = Coordinate(("component",), text_array(COMPONENTS))
+            units = text_array(["N"] * 3 + ["N m"] * 3)
+            coordinates[f"{row['name']}_units"] = Coordinate(("component",), units)
+            continue
+        on_q = row["axis"] == "coordinates"
+        scalars, dim = (positions, q_dim) if on_q else (velocities, v_dim)
+        whole = model.nq if on_q else model.nv
+        variables.append(_scalar_variable(row, dim, scalars, whole, coordinates))
+        coordinates[dim] = Coordinate((dim,), scalars.labels)
     if "joint" in coordinates:
         bodies = text_array(body_names[k] for k in selected)
         about = {"long_name": "outboard body of the joint"}
@@ -233,21 +169,19 @@ def _joint_variables(
     return variables, coordinates
 
 
-def _wrench_variable(
-    model: Model, wrenched: Collection[str], coordinates: dict[str, Coordinate]
-) -> Variable:
-    """The wrenches on the bodies that have any; the others would be columns of zeros."""
+def _body_variables(
+    model: Model,
+    rows: Sequence[Mapping[str, Any]],
+    wrenched: Collection[str],
+    coordinates: dict[str, Coordinate],
+) -> list[Variable]:
+    """Wrenches on the bodies that have any; the others would be columns of zeros."""
     names = model.body_names
     bodies = [k for k in range(model.n_joints) if names[k] in wrenched]
-    coordinates["wrenched_body"] = Coordinate(
-        ("wrenched_body",), text_array(names[k] for k in bodies)
-    )
+    labels = text_array(names[k] for k in bodies)
+    coordinates["wrenched_body"] = Coordinate(("wrenched_body",), labels)
     coordinates["component"] = Coordinate(("component",), text_array(COMPONENTS))
-    take = np.array(bodies, dtype=np.intp)
-    shape, real = (len(bodies), len(COMPONENTS)), np.dtype(np.float64)
-    return Variable(
-        "external_wrench", ("wrenched_body", "component"), shape, real, _WRENCH_ATTRS, take
-    )
+    return [_wrench_variable(row, "wrenched_body", bodies, False) for row in rows]
 
 
 def build_schema(
@@ -261,22 +195,22 @@ def build_schema(
     `wrenched` names the bodies with an external wrench, which is recorded for them alone.
     """
     kept = resolve_quantities(quantities)
+    rows = [row for row in TABLE if row["group"] in kept]
     if not wrenched:
-        kept = tuple(name for name in kept if name != "external_wrench")
+        rows = [row for row in rows if row["axis"] != "bodies"]
+    kept = tuple(dict.fromkeys(row["group"] for row in rows))
     selected = resolve_joints(model, joints)
     variables: list[Variable] = []
     coordinates: dict[str, Coordinate] = {}
-    if not set(kept) <= {
-        "energy",
-        "statistics",
-        "external_wrench",
-    }:  # labels of a million joints take seconds
-        variables, coordinates = _joint_variables(model, kept, selected)
-    if "external_wrench" in kept:
-        variables.append(_wrench_variable(model, wrenched, coordinates))
-    if "energy" in kept:
-        real = np.dtype(np.float64)
-        variables += [Variable(name, (), (), real, attrs) for name, attrs in _ENERGY_ATTRS.items()]
-    if "statistics" in kept:
-        variables += _statistics()
+    of_joints = [row for row in rows if row["axis"] in ("coordinates", "rates", "joints")]
+    if of_joints:  # labels of a million joints take seconds
+        variables, coordinates = _joint_variables(model, of_joints, selected)
+    of_bodies = [row for row in rows if row["axis"] == "bodies"]
+    if of_bodies:
+        variables += _body_variables(model, of_bodies, wrenched, coordinates)
+    variables += [
+        Variable(row["name"], (), (), _dtype(row), _attrs(row))
+        for row in rows
+        if row["axis"] == "none"
+    ]
     return Schema(tuple(variables), coordinates, kept)

@@ -126,10 +126,12 @@ class ArgumentBuilder:
             if key != "integrator":
                 known.append("auto")
             name = getattr(section, key)
-            if name not in known:
+            if name is not None and name not in known:
                 remedy = near(name, known, "known")
                 self.source.complain(("simulate", key), f"unknown {key} '{shorten(name)}'", remedy)
-        return section.model_dump()
+        options = section.model_dump()
+        rest = {name: options.pop(name) for name in ("duration", "threads")}
+        return {**rest, "numerics": {k: v for k, v in options.items() if v is not None}}
 
     def joints(self) -> list[str] | None:
         """Names of the joints to record."""

@@ -253,16 +253,16 @@ class RatingSection(Section):
 
 
 class SimulateSection(Section):
-    """Options of the integration and of the solver; see linkwise.simulate."""
+    """Options of linkwise.simulate and of its Numerics, where their defaults are."""
 
     duration: Time
-    tolerance: Annotated[Number, Field(gt=0)] = 1e-6
+    tolerance: Annotated[Number, Field(gt=0)] | None = None
     step_tolerance: Annotated[Number, Field(gt=0)] | None = None
-    integrator: str = "adams"
-    method: str = "auto"
-    solver: str = "auto"
-    initial_guess: str = "cubic"
-    stop: str = "energy_norm"
+    integrator: str | None = None
+    method: str | None = None
+    solver: str | None = None
+    initial_guess: str | None = None
+    stop: str | None = None
     solver_tolerance: Annotated[Number, Field(gt=0)] | None = None
     max_iterations: Annotated[int, Field(ge=1)] | None = None
     step: Time | None = None

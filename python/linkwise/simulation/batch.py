@@ -12,7 +12,7 @@ from linkwise import _core
 from linkwise._core import InputError, Model
 from linkwise.base import Array
 from linkwise.record.provenance import plain, provenance
-from linkwise.record.schema import TIME_ATTRS, Schema, build_schema
+from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
 from linkwise.simulation.arguments import number, optional_count, sample_times
 from linkwise.simulation.simulate import SimulationInterrupted, check_driven
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from linkwise.drives import Drive, Wrench
 
-QUANTITIES = ("position", "velocity", "acceleration", "joint_load", "drive_torque", "energy")
+QUANTITIES = tuple(dict.fromkeys(row["group"] for row in TABLE if row["of_members"]))
 
 
 def _machines(model: Model | Sequence[Model]) -> list[Model]:
@@ -67,7 +67,12 @@ def _members(given: dict[str, Array], models: int) -> tuple[tuple[int, ...], dic
 
 
 def _dataset(
-    columns: dict[str, Any], lead: tuple[int, ...], schema: Schema, times: Array, several: bool
+    columns: dict[str, Any],
+    endings: list[_core.Ending],
+    lead: tuple[int, ...],
+    schema: Schema,
+    times: Array,
+    several: bool,
 ) -> xr.Dataset:
     """The arrays (members, times, ...) of the core, with their axes and labels."""
     import xarray as xr
@@ -89,8 +94,8 @@ def _dataset(
         for name, coordinate in schema.coordinates.items()
     }
     ends = {
-        "outcome": (dims, np.array(columns["outcome"], dtype=np.str_).reshape(lead)),
-        "stop_time": (dims, columns["stop_time"].reshape(lead), {"units": "s"}),
+        "outcome": (dims, np.array([e.outcome for e in endings], dtype=np.str_).reshape(lead)),
+        "stop_time": (dims, np.array([e.time for e in endings]).reshape(lead), {"units": "s"}),
     }
     return xr.Dataset(
         data, coords={"time": ("time", times, dict(TIME_ATTRS)), **coordinates, **ends}
@@ -127,9 +132,9 @@ def simulate_batch(
             broadcast to those of the members.
         drives, wrenches: As for `simulate`, the same for all members; functions are refused.
         every, times: When to record, as for `simulate`.
-        integrator: "runge_kutta_4" or "semi_implicit_euler".
-        quantities: What to record, of "position", "velocity", "acceleration", "joint_load",
-            "drive_torque", "energy"; all by default.
+        integrator: One with a fixed step: "runge_kutta_4" or "semi_implicit_euler".
+        quantities: What to record, of "position", "velocity", "acceleration", "drive_torque",
+            "joint_load", "energy"; all by default.
         threads: Worker threads; the results do not depend on it.
 
     Returns:
@@ -179,7 +184,7 @@ def simulate_batch(
         float(count) * sampled.size * schema.row_bytes,
         f"{sampled.size} samples of {count} members",
     )
-    columns = _core.simulate_members(
+    columns, endings, interrupted = _core.simulate_members(
         simulations,
         q0=rows["q0"],
         v0=rows["v0"],
@@ -188,12 +193,12 @@ def simulate_batch(
         quantities=schema.quantities,
         threads=optional_count("threads", threads),
     )
-    dataset = _dataset(columns, lead, schema, sampled, not isinstance(model, Model))
-    early = sum(outcome != "converged" for outcome in columns["outcome"])
+    dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
+    early = sum(ending.outcome != "converged" for ending in endings)
     attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)
     attrs |= {"outcome": "converged" if not early else f"{early} of {count} members ended early"}
     dataset = dataset.assign_attrs({name: plain(value) for name, value in attrs.items()})
-    if columns["interrupted"]:
+    if interrupted:
         raise SimulationInterrupted(
             f"interrupted; {early} of {count} members are not complete", Run(dataset)
         )

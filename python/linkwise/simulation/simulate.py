@@ -21,13 +21,8 @@ from linkwise.record.memory import MemoryRecord
 from linkwise.record.provenance import describe, provenance
 from linkwise.record.schema import Schema, build_schema
 from linkwise.results import Run
-from linkwise.simulation.arguments import (
-    number,
-    optional_count,
-    optional_number,
-    sample_times,
-    state_vector,
-)
+from linkwise.simulation.arguments import optional_count, sample_times, state_vector
+from linkwise.simulation.numerics import DEFAULTS, Numerics
 from linkwise.simulation.time_loop import Ending, Progress, run_time_loop
 
 if TYPE_CHECKING:
@@ -157,19 +152,13 @@ def simulate(
     v0: npt.ArrayLike | None = None,
     every: float | None = None,
     times: npt.ArrayLike | None = None,
-    tolerance: float = 1e-6,
-    step_tolerance: float | None = None,
-    integrator: str = "adams",
-    method: str = "auto",
-    solver: str = "auto",
-    initial_guess: str = "cubic",
-    stop: str = "energy_norm",
-    solver_tolerance: float | None = None,
-    max_iterations: int | None = None,
-    solver_options: Mapping[str, Any] | None = None,
-    state: str = "joint_rates",
+    tolerance: float | None = None,
+    integrator: str | None = None,
+    method: str | None = None,
+    solver: str | None = None,
     step: float | None = None,
     max_step: float | None = None,
+    numerics: Numerics | Mapping[str, Any] | None = None,
     threads: int | None = None,
     quantities: Collection[str] | None = None,
     joints: Sequence[str] | None = None,
@@ -191,28 +180,19 @@ def simulate(
         v0: Initial velocities, shape (nv,); zero by default.
         every: Interval between samples [s]; a thousandth of the duration by default.
         times: The sample times instead [s], increasing.
-        tolerance: Accuracy to aim at, relative to the size of the state and absolute.
-        step_tolerance: Error allowed in one step, in the same measure; a tenth of `tolerance` by
-            default, which it replaces where given.
-        integrator: "adams", "bdf", "runge_kutta_4" or "semi_implicit_euler"; the last two take
-            fixed steps of `step` seconds.
+        tolerance: Accuracy to aim at, relative to the size of the state and absolute; 1e-6 by
+            default.
+        integrator: "adams" (the default), "bdf", or one that takes fixed steps of `step` seconds:
+            linkwise.integrators() lists them.
         method: How accelerations are computed: "auto", or one of linkwise.methods().
         solver: Linear solver of the constraint-force method: "auto", or one of linkwise.solvers().
-        initial_guess: Where an iterative solver starts: "zero", "previous", "linear", "cubic" or
-            "projection".
-        stop: Stopping test of an iterative solver: "energy_norm", "residual" or "paper".
-        solver_tolerance: What that test compares with, relative to the solution; by default the
-            integrator's error test decides how accurate solutions have to be.
-        max_iterations: Most iterations of one solution.
-        solver_options: Further options of the solver by name, which go first:
-            linkwise.solver_options() lists them.
-        state: What is integrated beside the coordinates: "joint_rates", or "body_velocities", the
-            bodies' own velocities, as in the 1993 paper (method "constraint_force" only).
         step: Step of the fixed-step integrators [s].
         max_step: Longest step of the others [s]; with given motions a fiftieth of the duration.
+        numerics: These and the rarer options in one object, or a dictionary of them; the
+            arguments above go before it.
         threads: Worker threads; the results do not depend on it.
-        quantities: What to record, of "position", "velocity", "acceleration", "joint_load",
-            "drive_torque", "external_wrench", "energy", "statistics"; all by default.
+        quantities: What to record, of "position", "velocity", "acceleration", "drive_torque",
+            "joint_load", "external_wrench", "energy", "statistics"; all by default.
         joints: Names of the joints to record; all by default.
         output: Path of a Zarr store to write while simulating; in memory when left out. An
             existing linkwise run there is replaced, anything else is refused.
@@ -236,32 +216,24 @@ def simulate(
         raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
     if output is not None:
         check_target(output)
-    options: dict[str, Any] = {
-        "integrator": integrator,
-        "tolerance": number("tolerance", tolerance),
-        "step_tolerance": optional_number("step_tolerance", step_tolerance),
-        "method": method,
-        "solver": solver,
-        "initial_guess": initial_guess,
-        "stop": stop,
-        "solver_tolerance": optional_number("solver_tolerance", solver_tolerance),
-        "max_iterations": optional_count("max_iterations", max_iterations),
-        "solver_options": None if solver_options is None else dict(solver_options),
-        "state": state,
-        "step": optional_number("step", step),
-        "max_step": optional_number("max_step", max_step),
-        "threads": optional_count("threads", threads),
-    }
-    if max_step is None and any(isinstance(drive, Motion) for drive in by_joint.values()):
+    options = Numerics.of(numerics).with_given(
+        tolerance=tolerance,
+        integrator=integrator,
+        method=method,
+        solver=solver,
+        step=step,
+        max_step=max_step,
+    )
+    if "max_step" not in options and any(isinstance(d, Motion) for d in by_joint.values()):
         # Joints at rest would let the steps grow until they pass over a whole short motion.
         options["max_step"] = float(sampled[-1]) / 50 or None
+    count = optional_count("threads", threads)
     for joint, drive in by_joint.items():
         try:
             drive.check(model, joint, float(sampled[-1]))
         except InputError as error:
             raise InputError(f"drives[{joint!r}]: {error}") from None
-    simulation = _core.Simulation(model, **options)
-    options["step_tolerance"] = simulation.step_tolerance
+    simulation = _core.Simulation(model, **options, threads=count)
     for joint, drive in by_joint.items():
         drive.apply(simulation, joint)
     for body, wrench in by_body.items():
@@ -269,7 +241,14 @@ def simulate(
     simulation.start(0.0, *start)
     attrs = provenance(
         model,
-        options={**options, "duration": float(sampled[-1]), "quantities": schema.quantities},
+        options={
+            **DEFAULTS,
+            **options,
+            "step_tolerance": simulation.step_tolerance,
+            "threads": count,
+            "duration": float(sampled[-1]),
+            "quantities": schema.quantities,
+        },
         scenario=scenario_text,
         cpu_target=_core.cpu_target,
     )

@@ -158,16 +158,13 @@ def run_time_loop(
                     recorded += len(chunk["time"])
                 if len(chunk["time"]):
                     reached = float(chunk["time"][-1])
-                    counters = {name: int(np.ravel(chunk[name])[-1]) for name in COUNTERS}
-                if chunk["outcome"] == "interrupted":
+                    counters = {name: getattr(simulation.statistics, name) for name in COUNTERS}
+                ended = simulation.ending
+                if ended.outcome == "interrupted":
                     break
-                if chunk["outcome"] != "converged":
+                if ended.outcome != "converged":
                     return Ending(
-                        str(chunk["outcome"]),
-                        float(chunk["stop_time"]),
-                        str(chunk["stop_joint"] or ""),
-                        str(chunk["message"] or ""),
-                        counters,
+                        ended.outcome, ended.time, simulation.stop_joint, ended.text, counters
                     )
                 if progress is not None:
                     wall = clock.monotonic() - started

@@ -193,6 +193,18 @@ struct BatchEvaluator::Work {
   std::vector<Group> q_, v_, tau_, du_, external_, passive_, none_, out_a_, out_b_;
 };
 
+BatchInput BatchInput::from(const Model& model, size_t first) const {
+  const auto rows = [&](const double* all, size_t width) {
+    return all ? all + first * width : nullptr;
+  };
+  const size_t nv = model.nv();
+  BatchInput part = *this;
+  part.q = rows(q, model.nq());
+  part.external = rows(external, 6 * static_cast<size_t>(model.n_joints()));
+  for (const double** row : {&part.v, &part.tau, &part.du, &part.passive}) *row = rows(*row, nv);
+  return part;
+}
+
 BatchEvaluator::BatchEvaluator(const Model& model) : work_(std::make_unique<Work>(model)) {}
 BatchEvaluator::~BatchEvaluator() = default;
 

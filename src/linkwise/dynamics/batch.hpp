@@ -17,6 +17,10 @@ struct BatchInput {
   const double* external = nullptr;  ///< [n_joints][6] a system
   double gravity_factor = 1;
   const double* passive = nullptr;  ///< loads by cause: the part of the torques that is no drive's
+  bool passive_acts = false;        ///< Evaluator: the model's passive forces act beside tau
+
+  /// The rows from `first` on.
+  BatchInput from(const Model& model, size_t first) const;
 };
 
 /// The methods that run on lanes.

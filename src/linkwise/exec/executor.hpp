@@ -14,6 +14,7 @@ class Executor {
   explicit Executor(int threads) : threads_(threads) {}
 
   int threads() const { return threads_; }
+  bool operator==(const Executor&) const = default;
 
   /// f(0) ... f(n - 1), in any order and at the same time; returns when all are done. Tasks share
   /// nothing, so the number of threads changes no result. Allocates nothing.

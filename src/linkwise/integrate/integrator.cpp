@@ -5,29 +5,27 @@
 #include <string>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/integrate/fixed/runge_kutta_4.hpp"
-#include "linkwise/integrate/fixed/semi_implicit_euler.hpp"
-#if defined(LINKWISE_WITH_SUNDIALS)
-#include "linkwise/integrate/sundials/cvode.hpp"
-#endif
 
 namespace linkwise {
+
+using MakeIntegrator = std::unique_ptr<Integrator>(OdeSystem&, const IntegratorOptions&);
+MakeIntegrator make_adams, make_bdf, make_runge_kutta_4, make_semi_implicit_euler;
+
 namespace {
 
 constexpr IntegratorEntry entries[] = {
 #if defined(LINKWISE_WITH_SUNDIALS)
-    {IntegratorKind::adams, "adams",
+    {"adams",
      "variable-order Adams, 1 to 12, functional iteration (CVODE); for motion that is not stiff",
      false, 12, make_adams},
-    {IntegratorKind::bdf, "bdf",
+    {"bdf",
      "variable-order backward differentiation, 1 to 5, Newton iteration (CVODE); for stiff springs "
      "and stops",
      false, 5, make_bdf},
 #endif
-    {IntegratorKind::runge_kutta_4, "runge_kutta_4",
-     "classical Runge-Kutta of order 4 with a fixed step; no error control", true, 4,
-     make_runge_kutta_4},
-    {IntegratorKind::semi_implicit_euler, "semi_implicit_euler",
+    {"runge_kutta_4", "classical Runge-Kutta of order 4 with a fixed step; no error control", true,
+     4, make_runge_kutta_4},
+    {"semi_implicit_euler",
      "symplectic Euler of order 1 with a fixed step; no error control, energy stays bounded", true,
      1, make_semi_implicit_euler},
 };
@@ -88,21 +86,33 @@ void check(const IntegratorEntry& entry, const IntegratorOptions& options) {
 std::span<const IntegratorEntry> integrator_registry() { return entries; }
 
 const IntegratorEntry& find_integrator(std::string_view name) {
-  for (const IntegratorEntry& entry : entries) {
+  for (const IntegratorEntry& entry : entries)
     if (entry.name == name) return entry;
-  }
-  throw InputError("unknown integrator '" + std::string(name) + "'; known are " + known_names());
+#if defined(LINKWISE_WITH_SUNDIALS)
+  constexpr std::string_view why = "";
+#else
+  constexpr std::string_view why = "; this build has no SUNDIALS, hence no adams and no bdf";
+#endif
+  throw InputError("unknown integrator '" + std::string(name) + "'; known are " + known_names() +
+                   std::string(why));
 }
 
-std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, OdeSystem& system,
+std::string fixed_step_names() {
+  std::string names;
+  for (const IntegratorEntry& entry : entries)
+    if (entry.fixed_step) names += (names.empty() ? "" : " or ") + std::string(entry.name);
+  return names;
+}
+
+void check_integrator(std::string_view name, const IntegratorOptions& options) {
+  check(find_integrator(name), options);
+}
+
+std::unique_ptr<Integrator> make_integrator(std::string_view name, OdeSystem& system,
                                             const IntegratorOptions& options) {
-  for (const IntegratorEntry& entry : entries) {
-    if (entry.kind != kind) continue;
-    check(entry, options);
-    return entry.make(system, options);
-  }
-  throw InputError("this build of linkwise has no SUNDIALS, hence no adams and no bdf; use " +
-                   known_names());
+  const IntegratorEntry& entry = find_integrator(name);
+  check(entry, options);
+  return entry.make(system, options);
 }
 
 }  // namespace linkwise

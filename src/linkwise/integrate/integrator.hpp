@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "linkwise/base/outcome.hpp"
@@ -32,8 +33,6 @@ struct OdeSystem {
   /// Called after each accepted step, with y normalised.
   virtual void accepted(double /*t*/, const double* /*y*/) {}
 };
-
-enum class IntegratorKind { adams, bdf, runge_kutta_4, semi_implicit_euler };
 
 struct IntegratorOptions {
   double tolerance = 1e-6;          ///< relative and absolute, unless given apart below
@@ -77,7 +76,6 @@ class Integrator {
 };
 
 struct IntegratorEntry {
-  IntegratorKind kind;
   std::string_view name;
   std::string_view description;
   bool fixed_step;
@@ -91,8 +89,12 @@ std::span<const IntegratorEntry> integrator_registry();
 /// The entry of that name; InputError that lists the known ones otherwise.
 const IntegratorEntry& find_integrator(std::string_view name);
 
-/// InputError where an option is out of range for the kind, or where the build lacks the kind.
-std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, OdeSystem& system,
+/// The names of those with a fixed step, as a user reads them: a or b.
+std::string fixed_step_names();
+
+/// InputError where an option is out of range, or the build has no integrator of that name.
+void check_integrator(std::string_view name, const IntegratorOptions& options);
+std::unique_ptr<Integrator> make_integrator(std::string_view name, OdeSystem& system,
                                             const IntegratorOptions& options);
 
 }  // namespace linkwise

@@ -4,28 +4,24 @@
 // and groups share nothing, so the number of threads does not change a bit.
 #include <functional>
 #include <span>
+#include <vector>
 
+#include "linkwise/exec/executor.hpp"
 #include "linkwise/simulate/simulation.hpp"
 
 namespace linkwise {
 
-/// Arrays with a row a member, members of one simulation next to each other.
-struct BatchStart {
-  const double *q = nullptr, *v = nullptr;
-  const double* tau = nullptr;  ///< constant, beside the drives; null: none
-};
-
-/// InputError where a simulation has what a batch cannot do: an integrator that chooses its steps,
+/// InputError where a setup has what members cannot share: an integrator that chooses its steps,
 /// functions of Python as drives.
-void check_batch(const Simulation& simulation);
+void check_members(const Setup& setup);
 
 /// Simulates from time 0 on. Model, drives, wrenches and integrator are those of the simulations,
 /// each of which has `per_simulation` members; the method is articulated_body. Arrays of `samples`
 /// are [member][time][...], NaN after a member's end: a member that fails ends alone. `go_on` is
 /// asked at every step, from any thread; once it is false, members under way end as `interrupted`.
 std::vector<Ending> simulate_batch(std::span<const Simulation* const> simulations,
-                                   size_t per_simulation, const BatchStart& start,
+                                   size_t per_simulation, const Start& start,
                                    std::span<const double> times, const Sample& samples,
-                                   int threads, const std::function<bool()>& go_on);
+                                   const Executor& executor, const std::function<bool()>& go_on);
 
 }  // namespace linkwise

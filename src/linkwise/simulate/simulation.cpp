@@ -2,152 +2,170 @@
 
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/dynamics/quantities.hpp"
-#include "linkwise/forces/passive.hpp"
+#include "linkwise/simulate/body_velocity_state.hpp"
 #include "linkwise/simulate/given_motion.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
+namespace {
 
-StateChoice state_choice_from_name(std::string_view name) {
-  if (name == "joint_rates") return StateChoice::joint_rates;
-  if (name == "body_velocities") return StateChoice::body_velocities;
-  throw InputError("state '" + std::string(name) + "' is unknown; known: joint_rates, " +
-                   "body_velocities");
-}
+// Beyond this an acceleration is as good as infinite; below, no sum of a step can overflow, so a
+// member that fails cannot end the others.
+constexpr double largest_acceleration = 1e100;
+
+}  // namespace
 
 Simulation::Simulation(std::shared_ptr<const Model> model, SimulationOptions options)
-    : model_(std::move(model)),
-      options_(std::move(options)),
-      choice_(choose_dynamics(*model_, options_.dynamics)),
-      drives_(model_->n_joints()) {
-  // Made once here so that bad options are refused before anything is written.
-  if (options_.state == StateChoice::body_velocities) {
-    if (options_.dynamics.method == "auto") options_.dynamics.method = "constraint_force";
-    choice_ = choose_dynamics(*model_, options_.dynamics);
-    BodyVelocities(*model_, options_.dynamics);
-  }
-  make_dynamics(*model_, options_.dynamics);
-  make_integrator(options_.integrator, *this, options_.integration);
-}
+    : Simulation(std::make_shared<Setup>(std::move(model), std::move(options))) {}
+Simulation::Simulation(std::shared_ptr<Setup> setup) : setup_(std::move(setup)), endings_(1) {}
+Simulation::~Simulation() = default;
 
 void Simulation::set_drive(int joint, Drive drive) {
-  const JointInfo& info = model_->joints[joint];
+  const JointInfo& info = model().joints[joint];
   const bool is_motion = drive.kind == DriveKind::motion;
   if ((drive.kind == DriveKind::pd || is_motion) && info.nq != info.nv)
-    throw InputError("joint '" + info.name + "'" + model_->where() + ": a " +
+    throw InputError("joint '" + info.name + "'" + model().where() + ": a " +
                      (is_motion ? "motion" : "pd") +
                      " drive needs angles or distances, not a quaternion; drive it by torque");
-  drives_[joint] = std::move(drive);
+  setup_->drives[joint] = std::move(drive);
 }
 
 void Simulation::add_wrench(Wrench wrench) {
-  const JointInfo& info = model_->joints[wrench.joint];
+  const JointInfo& info = model().joints[wrench.joint];
   if (!info.last_of_body)
     throw InputError(
-        "body '" + model_->links[info.link].name + "'" + model_->where() +
+        "body '" + model().links[info.link].name + "'" + model().where() +
         " has no mass, so no wrench can act on it; apply it to the next body outboard");
-  wrenches_.push_back(std::move(wrench));
+  setup_->wrenches.push_back(std::move(wrench));
 }
 
 void Simulation::start(double t0, const double* q0, const double* v0) {
-  const Model& m = *model_;
-  any_motion_ = false;
-  for (const Drive& drive : drives_) any_motion_ |= drive.kind == DriveKind::motion;
-  check_locked_joints(m, drives_, v0);
-  if (any_motion_ && options_.state == StateChoice::body_velocities)
+  setup_->settle();
+  const SimulationOptions& options = setup_->options;
+  if (setup_->any_motion() && options.state == StateChoice::body_velocities)
     throw InputError(
         "state body_velocities takes no motion drives; use the state joint_rates for them");
-  driven_ = driven_model(m, drives_);
-  const Model& driven = driven_ ? *driven_ : m;
-  DynamicsOptions integrated = options_.dynamics;
+  DynamicsOptions integrated = options.dynamics;
   solver_tolerance_.reset();
   if (follows_error_test()) {
-    const IntegratorOptions& o = options_.integration;
+    const IntegratorOptions& o = options.integration;
     solver_tolerance_ = std::make_unique<SolverTolerance>(
-        driven, o.relative_tolerance > 0 ? o.relative_tolerance : o.tolerance,
+        setup_->driven(), o.relative_tolerance > 0 ? o.relative_tolerance : o.tolerance,
         o.absolute_tolerance > 0 ? o.absolute_tolerance : o.tolerance,
-        options_.dynamics.solver_options.tolerance);
+        options.dynamics.solver_options.tolerance);
     integrated.solver_options.energy_bound = solver_tolerance_->bound();
+    solver_tolerance_->start(t0);
   }
-  method_ = make_dynamics(driven, integrated);
-  output_method_ = make_dynamics(driven, options_.dynamics);
-  inverse_ = driven_ ? std::make_unique<InverseDynamics<double>>(m) : nullptr;
-  world_wrenches_ = false;
-  for (const Wrench& w : wrenches_) world_wrenches_ |= w.world;
-  tau_.resize(m.nv());
-  du_.resize(m.nv());
-  holding_.resize(m.nv());
-  prescribed_.assign(m.nv(), 0.0);
-  imposed_.resize(any_motion_ ? size() : 0);
-  external_.resize(wrenches_.empty() ? 0 : 6 * m.n_joints());
-  poses_.resize(world_wrenches_ ? 16 * m.n_joints() : 0);
-  y_.assign(q0, q0 + m.nq());
-  body_velocities_.reset();
-  drift_ = 0;
-  if (options_.state == StateChoice::body_velocities) {
-    body_velocities_ = std::make_unique<BodyVelocities>(driven, options_.dynamics);
-    rates_.resize(m.nv());
-    y_.resize(m.nq() + body_velocities_->size());
-    body_velocities_->from_rates(q0, v0, y_.data() + m.nq());
-  } else {
-    y_.insert(y_.end(), v0, v0 + m.nv());
-  }
-  impose_motion(t0, y_.data());
-  check_quaternions(m, y_.data());
-  normalise(y_.data());
+  method_ = make_dynamics(setup_->driven(), integrated);
+  output_method_ = make_dynamics(setup_->driven(), options.dynamics);
+  members_ = 1;
+  lanes_.reset();
+  begin(t0, {q0, v0, nullptr});
+}
+
+void Simulation::start_members(double t0, size_t members, const Start& start) {
+  members_ = members;
+  method_.reset();
+  output_method_.reset();
+  solver_tolerance_.reset();
+  lanes_ = std::make_unique<BatchEvaluator>(setup_->driven());
+  begin(t0, start);
+}
+
+void Simulation::begin(double t0, const Start& start) {
+  const Model& m = model();
+  for (size_t i = 0; i < members_; ++i) check_locked_joints(m, setup_->drives, start.v + i * nv());
+  forces_.emplace(*setup_, members_, start.tau);
+  inverse_.reset();
+  given_.assign(members_ * nv(), 0.0);
+  y_.assign(start.q, start.q + members_ * nq());
+  y_.insert(y_.end(), start.v, start.v + members_ * nv());
+  impose(t0, y_.data());
+  for (size_t i = 0; i < members_; ++i) check_quaternions(m, y_.data() + i * nq());
+  endings_.assign(members_, {Outcome::converged, t0, -1, ""});
+  failure_ = {};
   iterations_ = 0;
+  drift_ = 0;
   trace_.clear();
-  ending_ = failure_ = Ending{};
-  if (solver_tolerance_) solver_tolerance_->start(t0);
-  integrator_ = make_integrator(options_.integrator, *this, options_.integration);
-  integrator_->start(t0, y_);
+  body_velocities_.reset();
+  OdeSystem* system = this;
+  if (setup_->options.state == StateChoice::body_velocities) {
+    body_velocities_ = std::make_unique<BodyVelocityState>(*this);
+    system = body_velocities_.get();
+  }
+  integrator_ = make_integrator(setup_->options.integrator, *system, setup_->options.integration);
+  integrator_->start(t0, body_velocities_ ? body_velocities_->start() : y_);
 }
 
 bool Simulation::follows_error_test() const {
-  if (!options_.follow_error_test || options_.state != StateChoice::joint_rates) return false;
-  if (choice_.solver.empty() || find_solver(choice_.solver).kind == SolverKind::direct)
-    return false;
-  if (options_.dynamics.solver_options.stop != StopRule::energy_norm) return false;
+  const SimulationOptions& options = setup_->options;
+  const std::string& solver = setup_->choice.solver;
+  if (!options.follow_error_test || options.state != StateChoice::joint_rates) return false;
+  if (solver.empty() || find_solver(solver).kind == SolverKind::direct) return false;
+  if (options.dynamics.solver_options.stop != StopRule::energy_norm) return false;
   // Started from zero, solutions are to depend on time and state alone.
-  if (options_.dynamics.initial_guess == "zero") return false;
-  for (const IntegratorEntry& entry : integrator_registry())
-    if (entry.kind == options_.integrator) return !entry.fixed_step;
-  return false;
+  if (options.dynamics.initial_guess == "zero") return false;
+  return !find_integrator(options.integrator).fixed_step;
 }
 
-SweepInput<double> Simulation::applied_forces(double t, const double* q, const double* v) {
-  const Model& m = *model_;
-  std::fill(tau_.begin(), tau_.end(), 0.0);
-  add_drive_torques(m, drives_, t, q, v, tau_.data());
+// ---- Accelerations ------------------------------------------------------------------------------
+
+SweepInput<double> Simulation::input(double t, const double* q, const double* v) {
+  forces_->evaluate(t, q, v);
   SweepInput<double> in;
   in.q = q;
   in.v = v;
-  in.tau = tau_.data();
-  in.prescribed = prescribed_.data();
-  if (!wrenches_.empty()) {
-    if (world_wrenches_) body_poses(m, q, poses_.data());
-    std::fill(external_.begin(), external_.end(), 0.0);
-    add_wrenches(m, wrenches_, t, poses_.data(), external_.data());
-    in.external = external_.data();
-  }
-  std::copy(tau_.begin(), tau_.end(), holding_.begin());  // the drives' share, for the record
-  add_passive_forces(m, q, v, tau_.data());
+  in.tau = forces_->tau(0);
+  in.prescribed = given_.data();
+  in.external = forces_->external(0);
   return in;
 }
 
-Outcome Simulation::accelerations(DynamicsMethod& method, double t, const double* q,
-                                  const double* v, double* du, double* loads) {
-  const SweepInput<double> in = applied_forces(t, q, v);
-  const auto evaluation = [&] { return method.evaluate(t, in, du, loads); };
-  const bool recorded = keeps_trace_ && &method == method_.get();
-  return judge(t, recorded ? traced(t, evaluation) : evaluation(), du, model_->nv());
+/// From `member` on.
+BatchInput Simulation::rows(const double* y, size_t member) const {
+  BatchInput in;
+  in.q = y + member * nq();
+  in.v = rates_in(y) + member * nv();
+  in.tau = forces_->tau(member);
+  in.du = setup_->any_given() ? given_.data() + member * nv() : nullptr;
+  in.external = forces_->external(member);
+  return in;
 }
 
-template <class Evaluation>
-DynamicsReport Simulation::traced(double t, Evaluation&& evaluation) {
+/// method: of one member.
+Outcome Simulation::accelerations(DynamicsMethod* method, double t, const double* y, double* du,
+                                  double* loads) {
+  if (lanes_) return on_lanes(t, y, du, loads);
+  const SweepInput<double> in = input(t, y, rates_in(y));
+  const auto evaluation = [&] { return method->evaluate(t, in, du, loads); };
+  const bool recorded = keeps_trace_ && method == method_.get();
+  return judge(t, recorded ? traced(t, evaluation) : evaluation(), du, static_cast<int>(nv()));
+}
+
+/// Of all members; those whose evaluation fails end.
+Outcome Simulation::on_lanes(double t, const double* y, double* du, double* loads) {
+  forces_->evaluate(t, y, rates_in(y));
+  const bool sound = lanes_->forward_dynamics(members_, rows(y, 0), du, loads) < 0;
+  for (size_t i = 0; i < members_; ++i) {
+    if (!endings_[i].ok()) continue;
+    double* row = du + i * nv();
+    const int body = sound ? -1
+                           : lanes_->forward_dynamics(1, rows(y, i), row,
+                                                      loads ? loads + i * n_load() : nullptr);
+    bool finite = true;
+    for (size_t k = 0; k < nv(); ++k) finite &= std::abs(row[k]) < largest_acceleration;
+    if (body >= 0)
+      endings_[i] = failure(i, t, Outcome::not_positive_definite, body, row);
+    else if (!finite)
+      endings_[i] = failure(i, t, Outcome::not_finite, -1, row);
+  }
+  return any_running() ? Outcome::converged : endings_[0].outcome;
+}
+
+DynamicsReport Simulation::traced(double t, const std::function<DynamicsReport()>& evaluation) {
   const auto started = std::chrono::steady_clock::now();
   const DynamicsReport report = evaluation();
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started;
@@ -155,162 +173,177 @@ DynamicsReport Simulation::traced(double t, Evaluation&& evaluation) {
   return report;
 }
 
+/// Of one member: an integrator that chooses its steps may recover, so nothing ends yet.
 Outcome Simulation::judge(double t, const DynamicsReport& report, const double* du, int n) {
   iterations_ += report.iterations;
   double sum = 0;
   for (int i = 0; i < n; ++i) sum += du[i];
   // Where rounding keeps the forces from what the error test would like, the fixed tolerance does.
-  const bool good_enough = solver_tolerance_ && report.outcome == Outcome::stagnated &&
-                           report.error_estimate <= options_.dynamics.solver_options.tolerance;
+  const bool good_enough =
+      solver_tolerance_ && report.outcome == Outcome::stagnated &&
+      report.error_estimate <= setup_->options.dynamics.solver_options.tolerance;
   if ((report.ok() || good_enough) && std::isfinite(sum)) return Outcome::converged;
-  record_failure(t, report, du);
+  failure_ = failure(0, t, report.ok() ? Outcome::not_finite : report.outcome, report.body, du);
   return failure_.outcome;
 }
 
-void Simulation::record_failure(double t, const DynamicsReport& report, const double* du) {
-  const Model& m = *model_;
-  failure_.time = t;
-  failure_.joint = -1;
-  Outcome outcome = report.outcome;
-  if (report.ok()) outcome = Outcome::not_finite;
+Ending Simulation::failure(size_t member, double t, Outcome outcome, int body,
+                           const double* du) const {
+  const Model& m = model();
   // What was given to a joint before what came out at it: one bad torque spoils all accelerations.
-  const auto name_first = [&](const std::vector<double>& given, int first, int n, int j) {
-    for (int i = first; i < first + n && !given.empty(); ++i)
-      if (failure_.joint < 0 && !std::isfinite(given[i])) failure_.joint = j;
-  };
-  for (int j = 0; j < m.n_joints() && report.body < 0; ++j) {
-    name_first(tau_, m.joints[j].v, m.joints[j].nv, j);
-    name_first(external_, 6 * j, 6, j);
-  }
-  for (int j = 0; j < m.n_joints() && failure_.joint < 0; ++j) {
+  int joint = body < 0 ? forces_->joint_with_bad_force(member) : -1;
+  for (int j = 0; j < m.n_joints() && joint < 0; ++j) {
     const JointInfo& info = m.joints[j];
-    if (report.body >= 0 && info.body == report.body && info.last_of_body) failure_.joint = j;
-    for (int i = info.v; i < info.v + info.nv && report.body < 0; ++i)
-      if (!std::isfinite(du[i])) failure_.joint = j;
+    if (body >= 0 && info.body == body && info.last_of_body) joint = j;
+    for (int i = info.v; i < info.v + info.nv && body < 0; ++i)
+      if (!(std::abs(du[i]) < largest_acceleration)) joint = j;
   }
-  failure_.outcome = outcome;
-  failure_.text = describe(outcome);
+  return {outcome, t, joint, describe(outcome)};
 }
+
+// ---- What the integrator sees -------------------------------------------------------------------
 
 Outcome Simulation::evaluate(double t, const double* y, double* ydot) {
-  const Model& m = *model_;
   if (solver_tolerance_) solver_tolerance_->set(t);
-  if (any_motion_) return evaluate_imposed(t, y, ydot);
-  const double *q = y, *v = y + m.nq();
-  position_rates(q, v, ydot);
-  double* dv = ydot + m.nq();
-  if (!body_velocities_) return accelerations(*method_, t, q, v, dv, nullptr);
-  const SweepInput<double> in = applied_forces(t, q, rates_.data());
-  const auto evaluation = [&] { return body_velocities_->evaluate(t, in, v, dv); };
-  const DynamicsReport report = keeps_trace_ ? traced(t, evaluation) : evaluation();
-  return judge(t, report, dv, body_velocities_->size());
-}
-
-Outcome Simulation::evaluate_imposed(double t, const double* y, double* ydot) {
-  const Model& m = *model_;
-  std::copy(y, y + size(), imposed_.begin());
-  impose_motion(t, imposed_.data());
-  const double *q = imposed_.data(), *v = q + m.nq();
-  position_rates(q, v, ydot);
-  const Outcome outcome = accelerations(*method_, t, q, v, ydot + m.nq(), nullptr);
-  rest_imposed(m, drives_, ydot, ydot + m.nq());
+  const bool given = setup_->any_motion(), ended = any_ended();
+  if (given || ended) {
+    imposed_.assign(y, y + size());
+    if (ended) stand_in(imposed_.data());
+    impose(t, imposed_.data());
+    y = imposed_.data();
+  }
+  double* dv = rates_in(ydot);
+  position_rates(y, rates_in(y), ydot);
+  const Outcome outcome = accelerations(method_.get(), t, y, dv, nullptr);
+  for (size_t i = 0; i < members_ && (given || any_ended()); ++i) {
+    if (members_ > 1 && !endings_[i].ok()) {
+      std::fill_n(ydot + i * nq(), nq(), 0.0);
+      std::fill_n(dv + i * nv(), nv(), 0.0);
+    } else if (given) {
+      rest_imposed(model(), setup_->drives, ydot + i * nq(), dv + i * nv());
+    }
+  }
   return outcome;
 }
 
-void Simulation::impose_motion(double t, double* y) {
-  if (!any_motion_) return;
-  linkwise::impose_motion(*model_, drives_, t, y, y + model_->nq(), prescribed_.data());
-}
-
 void Simulation::position_rates(const double* q, const double* v, double* qdot) {
-  if (body_velocities_) {
-    body_velocities_->to_rates(q, v, rates_.data());
-    v = rates_.data();
-  }
-  for (const Element& e : model_->elements) element_position_rate(e, q, v, qdot);
+  for (size_t i = 0; i < members_; ++i)
+    for (const Element& e : model().elements)
+      element_position_rate(e, q + i * nq(), v + i * nv(), qdot + i * nq());
 }
 
-void Simulation::normalise(double* y) { normalise_quaternions(*model_, y); }
+void Simulation::normalise(double* y) {
+  for (size_t i = 0; i < members_; ++i) normalise_quaternions(model(), y + i * nq());
+}
 
 void Simulation::accepted(double t, const double* y) {
   if (!trace_.empty()) trace_.back().accepted = true;
-  if (solver_tolerance_) solver_tolerance_->accepted(t, y, y + model_->nq());
-  if (body_velocities_)
-    body_velocities_->accepted(t);
-  else
-    method_->accepted(t);
+  if (solver_tolerance_) solver_tolerance_->accepted(t, y, rates_in(y));
+  if (method_) method_->accepted(t);
 }
 
-bool Simulation::advance(double t, const Sample& sample) {
-  if (!ending_.ok()) return false;
+/// Writes what motion drives give at time t.
+void Simulation::impose(double t, double* y) {
+  if (!setup_->any_motion()) return;
+  for (size_t i = 0; i < members_; ++i)
+    impose_motion(model(), setup_->drives, t, y + i * nq(), rates_in(y) + i * nv(),
+                  given_.data() + i * nv());
+}
+
+/// Rows of members that ended become those of one that did not, so that the lanes compute something
+/// sound there.
+void Simulation::stand_in(double* y) const {
+  size_t from = 0;
+  while (from < members_ && !endings_[from].ok()) ++from;
+  for (size_t i = 0; i < members_ && from < members_; ++i) {
+    if (endings_[i].ok()) continue;
+    std::copy_n(y + from * nq(), nq(), y + i * nq());
+    std::copy_n(rates_in(y) + from * nv(), nv(), rates_in(y) + i * nv());
+  }
+}
+
+// ---- The loop -----------------------------------------------------------------------------------
+
+bool Simulation::any_running() const {
+  for (const Ending& ending : endings_)
+    if (ending.ok()) return true;
+  return false;
+}
+
+bool Simulation::any_ended() const {
+  for (const Ending& ending : endings_)
+    if (!ending.ok()) return true;
+  return false;
+}
+
+bool Simulation::end_all(const Ending& ending) {
+  for (Ending& one : endings_)
+    if (one.ok()) one = ending;
+  return false;
+}
+
+bool Simulation::reach(double t) {
   while (integrator_->time() < t) {
+    if (!any_running()) return false;
     Outcome outcome = Outcome::interrupted;
     if (!interrupted_ || !interrupted_()) outcome = integrator_->step(t);
     if (outcome == Outcome::converged) continue;
     // What failed within the step says more than that it failed.
-    ending_ = failure_.outcome == outcome
-                  ? failure_
-                  : Ending{outcome, integrator_->time(), failure_.joint, describe(outcome)};
-    return false;
+    return end_all(failure_.outcome == outcome
+                       ? failure_
+                       : Ending{outcome, integrator_->time(), failure_.joint, describe(outcome)});
   }
-  integrator_->interpolate(t, y_);
-  impose_motion(t, y_.data());
+  return any_running();
+}
+
+bool Simulation::advance(double t, const Sample& sample) {
+  if (!reach(t)) return false;
+  if (body_velocities_)
+    drift_ = body_velocities_->interpolate(t);
+  else
+    integrator_->interpolate(t, y_);
+  impose(t, y_.data());
   return write_sample(t, sample);
 }
 
-bool Simulation::write_sample(double t, const Sample& s) {
-  const Model& m = *model_;
-  const double *q = y_.data(), *v = y_.data() + m.nq();
-  if (body_velocities_) {
-    drift_ = body_velocities_->drift(q, v);
-    body_velocities_->to_rates(q, v, rates_.data());
-    v = rates_.data();
-  }
-  if (s.position) std::copy(q, q + m.nq(), s.position);
-  if (s.velocity) std::copy(v, v + m.nv(), s.velocity);
-  if (s.acceleration || s.joint_load || s.drive_torque || s.external) {
+bool Simulation::write_sample(double t, const Sample& sample) {
+  if (sample.needs(Needs::forces)) {
+    du_.resize(members_ * nv());
+    loads_.resize(sample.needs(Needs::loads) ? members_ * n_load() : 0);
+    if (any_ended()) stand_in(y_.data());
     const long iterations = iterations_;
-    const Outcome outcome = accelerations(*output_method_, t, q, v, du_.data(), s.joint_load);
+    const Outcome outcome = accelerations(output_method_.get(), t, y_.data(), du_.data(),
+                                          loads_.empty() ? nullptr : loads_.data());
     iterations_ = iterations;  // those of the record are not the integration's
-    if (outcome != Outcome::converged) {
-      ending_ = failure_;
-      return false;
-    }
-    output_method_->accepted(t);
-    if (s.acceleration) std::copy(du_.begin(), du_.end(), s.acceleration);
-    if (s.external) {
-      if (external_.empty())
-        std::fill_n(s.external, 6 * m.n_joints(), 0.0);
-      else
-        std::copy(external_.begin(), external_.end(), s.external);
-    }
-    if (s.drive_torque) {
-      std::copy(holding_.begin(), holding_.end(), s.drive_torque);
-      write_holding_torques(q, v, s.drive_torque);
-    }
+    if (outcome != Outcome::converged) return end_all(failure_);
+    if (output_method_) output_method_->accepted(t);
+    if (setup_->any_given()) add_holding_torques();
   }
-  if (s.kinetic_energy) *s.kinetic_energy = kinetic_energy(m, q, v);
-  if (s.potential_energy) *s.potential_energy = potential_energy(m, q);
+  const SimulationStatistics now = statistics();
+  for (size_t i = 0; i < members_; ++i) {
+    const Instant at{model(),
+                     y_.data() + i * nq(),
+                     rates_in(y_.data()) + i * nv(),
+                     du_.data() + i * nv(),
+                     loads_.data() + i * n_load(),
+                     forces_->drive(i),
+                     forces_->external(i),
+                     now};
+    const bool running = endings_[i].ok();
+    sample.write(model(), i, running ? &at : nullptr);
+    if (running) endings_[i].time = t;
+  }
   return true;
 }
 
-/// What moves or holds a joint of given motion: the torque of the motion less what the joint does
-/// by itself.
-void Simulation::write_holding_torques(const double* q, const double* v, double* drive_torque) {
-  if (!driven_) return;
-  const Model& m = *model_;
-  SweepInput<double> in;
-  in.q = q;
-  in.v = v;
-  in.external = wrenches_.empty() ? nullptr : external_.data();
-  std::vector<double> total(m.nv());
-  inverse_->evaluate(in, du_.data(), total.data(), nullptr);
-  for (int j = 0; j < m.n_joints(); ++j) {
-    if (!is_prescribed(drives_[j].kind)) continue;
-    const JointInfo& info = m.joints[j];
-    for (int i = info.v; i < info.v + info.nv; ++i)
-      drive_torque[i] = total[i] - (tau_[i] - holding_[i]);
-  }
+/// What moves or holds joints of given motion: the torque of the motion less what acts by itself.
+void Simulation::add_holding_torques() {
+  if (!inverse_) inverse_ = std::make_unique<BatchEvaluator>(model());
+  total_.resize(members_ * nv());
+  BatchInput in = rows(y_.data(), 0);
+  in.du = du_.data();
+  inverse_->inverse_dynamics(members_, in, total_.data(), nullptr);
+  forces_->add_holding_torques(total_.data());
 }
 
 SimulationStatistics Simulation::statistics() const {

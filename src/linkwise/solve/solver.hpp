@@ -77,6 +77,8 @@ struct SolverOptions {
   int lag_limit = 8;
   /// Who shares an iteration's products and sums; it influences no result.
   Executor executor;
+
+  bool operator==(const SolverOptions&) const = default;
 };
 
 /// Throws InputError that names the option when one is out of range.

@@ -19,23 +19,22 @@ inline std::shared_ptr<const Model> make_model(ModelSpec spec) {
 }
 
 /// Of this step where the kind takes one, else of the default tolerance.
-inline SimulationOptions fixed_step(double step,
-                                    IntegratorKind kind = IntegratorKind::runge_kutta_4) {
+inline SimulationOptions fixed_step(double step, std::string_view kind = "runge_kutta_4") {
   SimulationOptions options;
   options.integrator = kind;
   for (const IntegratorEntry& entry : integrator_registry())
-    if (entry.kind == kind && entry.fixed_step) options.integration.step = step;
+    if (entry.name == kind && entry.fixed_step) options.integration.step = step;
   return options;
 }
 
-struct Instant {
+struct Recorded {
   std::vector<double> q, v, du, loads, drive_torque, external;
   double kinetic = 0, potential = 0;
   double energy() const { return kinetic + potential; }
 };
 
 /// One sample at t, or nothing when the run stopped.
-inline bool advance(Simulation& simulation, double t, Instant& at) {
+inline bool advance(Simulation& simulation, double t, Recorded& at) {
   const Model& m = simulation.model();
   at.q.resize(m.nq());
   at.v.resize(m.nv());
@@ -44,21 +43,21 @@ inline bool advance(Simulation& simulation, double t, Instant& at) {
   at.drive_torque.resize(m.nv());
   at.external.resize(6 * m.n_joints());
   Sample sample;
-  sample.position = at.q.data();
-  sample.velocity = at.v.data();
-  sample.acceleration = at.du.data();
-  sample.joint_load = at.loads.data();
-  sample.drive_torque = at.drive_torque.data();
-  sample.external = at.external.data();
-  sample.kinetic_energy = &at.kinetic;
-  sample.potential_energy = &at.potential;
+  sample["position"] = at.q.data();
+  sample["velocity"] = at.v.data();
+  sample["acceleration"] = at.du.data();
+  sample["joint_load"] = at.loads.data();
+  sample["drive_torque"] = at.drive_torque.data();
+  sample["external_wrench"] = at.external.data();
+  sample["kinetic_energy"] = &at.kinetic;
+  sample["potential_energy"] = &at.potential;
   return simulation.advance(t, sample);
 }
 
-inline std::vector<Instant> run(Simulation& simulation, const std::vector<double>& times) {
-  std::vector<Instant> out;
+inline std::vector<Recorded> run(Simulation& simulation, const std::vector<double>& times) {
+  std::vector<Recorded> out;
   for (double t : times) {
-    Instant at;
+    Recorded at;
     if (!advance(simulation, t, at)) break;
     out.push_back(at);
   }
@@ -77,9 +76,9 @@ inline double distance(const std::vector<double>& a, const std::vector<double>& 
   return worst;
 }
 
-inline std::vector<IntegratorKind> all_kinds() {
-  std::vector<IntegratorKind> kinds;
-  for (const IntegratorEntry& entry : integrator_registry()) kinds.push_back(entry.kind);
+inline std::vector<std::string_view> all_kinds() {
+  std::vector<std::string_view> kinds;
+  for (const IntegratorEntry& entry : integrator_registry()) kinds.push_back(entry.name);
   return kinds;
 }
 

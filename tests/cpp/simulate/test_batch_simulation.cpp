@@ -36,16 +36,16 @@ struct Members {
     kinetic.assign(count * times, 7);
     potential.assign(count * times, 7);
   }
-  BatchStart start() const { return {q.data(), v.data(), tau.data()}; }
+  Start start() const { return {q.data(), v.data(), tau.data()}; }
   Sample samples() {
     Sample out;
-    out.position = position.data();
-    out.velocity = velocity.data();
-    out.acceleration = acceleration.data();
-    out.joint_load = load.data();
-    out.drive_torque = torque.data();
-    out.kinetic_energy = kinetic.data();
-    out.potential_energy = potential.data();
+    out["position"] = position.data();
+    out["velocity"] = velocity.data();
+    out["acceleration"] = acceleration.data();
+    out["joint_load"] = load.data();
+    out["drive_torque"] = torque.data();
+    out["kinetic_energy"] = kinetic.data();
+    out["potential_energy"] = potential.data();
     return out;
   }
   std::vector<double> row(const std::vector<double>& of, size_t member, size_t time) const {
@@ -97,7 +97,7 @@ class BatchSimulation : public ::testing::TestWithParam<bool> {};
 TEST_P(BatchSimulation, EqualsOneByOne) {
   const auto model = make_model(every_kind());
   const std::vector<double> times = {0, 0.0137, 0.1};
-  for (IntegratorKind kind : {IntegratorKind::runge_kutta_4, IntegratorKind::semi_implicit_euler}) {
+  for (std::string_view kind : {"runge_kutta_4", "semi_implicit_euler"}) {
     const SimulationOptions options =
         with(fixed_step(1e-3, kind), {"articulated_body", StateChoice::joint_rates});
     Simulation shared(model, options);
@@ -108,7 +108,7 @@ TEST_P(BatchSimulation, EqualsOneByOne) {
         members.tau[i * model->nv()] = members.tau[(i + 1) * model->nv() - 1] = 0;
       const Simulation* const all[] = {&shared};
       const auto ends =
-          simulate_batch(all, count, members.start(), times, members.samples(), 1, go_on);
+          simulate_batch(all, count, members.start(), times, members.samples(), Executor(1), go_on);
       for (size_t i = 0; i < count; ++i) {
         EXPECT_EQ(ends[i].outcome, Outcome::converged);
         EXPECT_EQ(ends[i].time, 0.1);
@@ -156,14 +156,14 @@ TEST(BatchSimulation, SeveralModels) {
   const std::vector<double> times = {0.1};
   const size_t per = native_lanes + 1;
   Members together(*light, 2 * per, 1);
-  simulate_batch(both, per, together.start(), times, together.samples(), 2, go_on);
+  simulate_batch(both, per, together.start(), times, together.samples(), Executor(2), go_on);
   for (size_t m = 0; m < 2; ++m) {
     Members apart(*light, per, 1);
-    const BatchStart start{together.q.data() + m * per * light->nq(),
-                           together.v.data() + m * per * light->nv(),
-                           together.tau.data() + m * per * light->nv()};
+    const Start start{together.q.data() + m * per * light->nq(),
+                      together.v.data() + m * per * light->nv(),
+                      together.tau.data() + m * per * light->nv()};
     const Simulation* const single[] = {both[m]};
-    simulate_batch(single, per, start, times, apart.samples(), 1, go_on);
+    simulate_batch(single, per, start, times, apart.samples(), Executor(1), go_on);
     const auto first = together.load.begin() + m * apart.load.size();
     EXPECT_EQ(apart.load, std::vector<double>(first, first + apart.load.size()));
   }
@@ -178,7 +178,8 @@ TEST(BatchSimulationThreads, SameBits) {
   std::vector<double> first;
   for (int threads : {1, 1, 2, 3, 7}) {
     Members members(*model, 5 * native_lanes + 3, times.size());
-    simulate_batch(all, members.count, members.start(), times, members.samples(), threads, go_on);
+    simulate_batch(all, members.count, members.start(), times, members.samples(), Executor(threads),
+                   go_on);
     if (first.empty()) first = members.everything();
     EXPECT_EQ(members.everything(), first) << threads << " threads";
   }
@@ -204,8 +205,8 @@ TEST(BatchSimulation, AMemberThatFailsEndsAlone) {
   for (size_t i : at_rest)
     for (int k = 0; k < 3; ++k) members.q[3 * i + k] = members.v[3 * i + k] = 0;
   std::fill(members.tau.begin(), members.tau.end(), 0);
-  const auto ends =
-      simulate_batch(all, members.count, members.start(), times, members.samples(), 2, go_on);
+  const auto ends = simulate_batch(all, members.count, members.start(), times, members.samples(),
+                                   Executor(2), go_on);
   for (size_t i = 0; i < members.count; ++i) {
     const bool rests = i == at_rest[0] || i == at_rest[1];
     EXPECT_EQ(ends[i].outcome, rests ? Outcome::converged : Outcome::not_finite) << i;
@@ -233,8 +234,8 @@ TEST(BatchSimulation, AMachineThatCannotMove) {
   const Simulation* const all[] = {&shared};
   const std::vector<double> times = {0, 0.1};
   Members members(*model, native_lanes + 1, times.size());
-  for (const Ending& end :
-       simulate_batch(all, members.count, members.start(), times, members.samples(), 1, go_on)) {
+  for (const Ending& end : simulate_batch(all, members.count, members.start(), times,
+                                          members.samples(), Executor(1), go_on)) {
     EXPECT_EQ(end.outcome, Outcome::not_positive_definite);
     EXPECT_EQ(end.time, 0);
   }
@@ -249,7 +250,7 @@ TEST(BatchSimulation, StopsWhenItIsAskedTo) {
     Members members(*model, 3 * native_lanes, times.size());
     std::atomic<int> asked{0};
     const auto ends = simulate_batch(all, members.count, members.start(), times, members.samples(),
-                                     threads, [&] { return ++asked < 100; });
+                                     Executor(threads), [&] { return ++asked < 100; });
     for (const Ending& end : ends) EXPECT_EQ(end.outcome, Outcome::interrupted);
     EXPECT_TRUE(std::isfinite(members.row(members.position, 3 * native_lanes - 1, 0)[0]));
     EXPECT_TRUE(std::isnan(members.row(members.position, 0, 2)[0]));
@@ -258,24 +259,24 @@ TEST(BatchSimulation, StopsWhenItIsAskedTo) {
 
 TEST(BatchSimulation, RefusesWhatItCannotTake) {
   const auto model = make_model(pendulum());
-  for (IntegratorKind kind : all_kinds()) {
+  for (std::string_view kind : all_kinds()) {
     Simulation simulation(model, fixed_step(1e-3, kind));
-    if (simulation.options().integration.step > 0)
-      EXPECT_NO_THROW(check_batch(simulation));
+    if (simulation.setup().options.integration.step > 0)
+      EXPECT_NO_THROW(check_members(simulation.setup()));
     else
-      EXPECT_THROW(check_batch(simulation), InputError);
+      EXPECT_THROW(check_members(simulation.setup()), InputError);
   }
   Simulation driven(model, fixed_step(1e-3));
   Drive function;
   function.kind = DriveKind::torque_callable;
   function.callable = [](double, const double*, const double*, double* out) { *out = 0; };
   driven.set_drive(0, function);
-  EXPECT_THROW(check_batch(driven), InputError);
+  EXPECT_THROW(check_members(driven.setup()), InputError);
   Simulation pushed(model, fixed_step(1e-3));
   Wrench wrench;
   wrench.callable = [](double, double* out) { std::fill_n(out, 6, 0.0); };
   pushed.add_wrench(wrench);
-  EXPECT_THROW(check_batch(pushed), InputError);
+  EXPECT_THROW(check_members(pushed.setup()), InputError);
 }
 
 }  // namespace

@@ -110,7 +110,7 @@ TEST(GivenMotion, IsFollowedExactly) {
       simulation.set_drive(1, motion);
       simulation.start(0, state.q.data(), state.v.data());
       for (double t : {0.0, 0.1, 0.2537}) {
-        Instant at;
+        Recorded at;
         ASSERT_TRUE(advance(simulation, t, at));
         const auto rate = twin.position_rate(at.q, at.v);
         double q[6], v[6], a[6];
@@ -145,7 +145,7 @@ TEST(GivenMotion, IsRefusedWhereItCannotBe) {
 }
 
 /// A ball of 2 kg spinning about z at 3 rad/s, pushed with 4 N along x.
-std::vector<Instant> push(bool world) {
+std::vector<Recorded> push(bool world) {
   ModelSpec spec;
   spec.gravity = {};
   spec.floating_base = true;
@@ -192,7 +192,7 @@ TEST(Wrenches, AppearInTheJointLoads) {
   const auto at = run(simulation, {0, 0.1});
   ASSERT_EQ(at.size(), 2u);
   const WorldTwin twin(*model);
-  for (const Instant& i : at) {
+  for (const Recorded& i : at) {
     const auto pose = twin.motions(i.q, i.v).pose[model->joints[1].link];
     std::vector<double> external(6 * model->n_joints());
     for (int k = 0; k < 6; ++k) external[18 + k] = in_body.value[k];

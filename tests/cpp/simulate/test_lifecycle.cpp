@@ -61,7 +61,7 @@ TEST(Lifecycle, Simulations) {
   lock.kind = DriveKind::locked;
   for (int i = 0; i < cycles; ++i)
     for (const IntegratorEntry& entry : integrator_registry()) {
-      Simulation simulation(model, fixed_step(1e-3, entry.kind));
+      Simulation simulation(model, fixed_step(1e-3, entry.name));
       if (i % 2) simulation.set_drive(0, lock);
       simulation.start(0, state.q.data(), at_rest.data());
       ASSERT_EQ(run(simulation, {0.0015}).size(), 1u);
@@ -80,12 +80,12 @@ TEST(Lifecycle, BatchesOfSimulations) {
   const double times[] = {0.0015};
   std::vector<double> loads(3 * 6 * model->n_joints());
   Sample sample;
-  sample.joint_load = loads.data();
+  sample["joint_load"] = loads.data();
   for (int i = 0; i < cycles; ++i) {
     const Simulation simulation(model, fixed_step(1e-3));
     const Simulation* const all[] = {&simulation};
-    const auto ends =
-        simulate_batch(all, 3, {q.data(), v.data()}, times, sample, 2, [] { return true; });
+    const auto ends = simulate_batch(all, 3, {q.data(), v.data()}, times, sample, Executor(2),
+                                     [] { return true; });
     ASSERT_EQ(ends[2].outcome, Outcome::converged);
   }
 }

@@ -28,14 +28,14 @@ TEST(Stops, NotFiniteNamesTheJointAndKeepsWhatCameBefore) {
     EXPECT_EQ(stop.joint, joint);
     EXPECT_NEAR(stop.time, 0.25, 0.05);
     EXPECT_FALSE(stop.text.empty());
-    Instant later;
+    Recorded later;
     EXPECT_FALSE(advance(simulation, 2, later));
   };
   for (const IntegratorEntry& integrator : integrator_registry())
     for (const Formulation& f : formulations(*model))
       for (double bad : {std::numeric_limits<double>::quiet_NaN(), infinity}) {
         SCOPED_TRACE(std::string(integrator.name) + " " + ::testing::PrintToString(f));
-        const SimulationOptions options = with(fixed_step(1e-3, integrator.kind), f);
+        const SimulationOptions options = with(fixed_step(1e-3, integrator.name), f);
         Drive drive;
         drive.kind = DriveKind::torque_callable;
         drive.callable = [bad](double t, const double*, const double*, double* out) {
@@ -70,12 +70,12 @@ TEST(Stops, AStateThatBlowsUpIsNotFinite) {
   EXPECT_LT(at.size(), 1000u);
   EXPECT_EQ(simulation.ending().outcome, Outcome::not_finite);
   EXPECT_EQ(simulation.ending().joint, 0);
-  for (const Instant& i : at) EXPECT_TRUE(std::isfinite(i.q[0] + i.v[0]));
+  for (const Recorded& i : at) EXPECT_TRUE(std::isfinite(i.q[0] + i.v[0]));
 }
 
 TEST(Stops, WhenItIsAskedTo) {
   const auto model = make_model(pendulum());
-  for (IntegratorKind kind : all_kinds()) {
+  for (std::string_view kind : all_kinds()) {
     Simulation simulation(model, fixed_step(1e-3, kind));
     int asked = 0;
     simulation.set_interrupt([&] { return ++asked > 20; });
@@ -90,11 +90,11 @@ TEST(Stops, WhenItIsAskedTo) {
 
 TEST(Stops, AStartThatIsNotFinite) {
   const auto model = make_model(pendulum());
-  for (IntegratorKind kind : all_kinds()) {
+  for (std::string_view kind : all_kinds()) {
     Simulation simulation(model, fixed_step(1e-3, kind));
     const double q = std::numeric_limits<double>::quiet_NaN(), v = 0;
     simulation.start(0, &q, &v);
-    Instant at;
+    Recorded at;
     EXPECT_FALSE(advance(simulation, 1, at));
     EXPECT_EQ(simulation.ending().outcome, Outcome::not_finite);
   }

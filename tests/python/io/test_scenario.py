@@ -47,17 +47,7 @@ def test_defaults(write):
     given = arguments(path)
     assert given == {
         "duration": 10.0,
-        "tolerance": 1e-6,
-        "integrator": "adams",
-        "method": "auto",
-        "solver": "auto",
-        "initial_guess": "cubic",
-        "stop": "energy_norm",
-        "step_tolerance": None,
-        "solver_tolerance": None,
-        "max_iterations": None,
-        "step": None,
-        "max_step": None,
+        "numerics": {},
         "threads": None,
         "drives": {},
         "wrenches": {},
@@ -115,8 +105,8 @@ def test_everything(write, arm):
     model = scenario.load_model()
     np.testing.assert_array_equal(model.gravity, [0, -1.62, 0])
     given = scenario.simulate_arguments(model)
-    assert (given["duration"], given["max_step"]) == (30.0, 0.1)
-    assert (given["tolerance"], given["integrator"], given["threads"]) == (1e-8, "bdf", 2)
+    assert (given["duration"], given["threads"]) == (30.0, 2)
+    assert given["numerics"] == {"tolerance": 1e-8, "integrator": "bdf", "max_step": 0.1}
     np.testing.assert_allclose(given["q0"], [math.pi / 6, 0.005])
     np.testing.assert_allclose(given["v0"], [1.5, 0])
     pd, force = given["drives"]["shoulder"], given["drives"]["slide"]

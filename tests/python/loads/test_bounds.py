@@ -21,7 +21,9 @@ def test_the_algebraic_bound_sees_an_early_stop(rng):
     model = lw.scenes.chain(12, joint="spherical")
     options = {"duration": 0.2, "every": 0.02, "method": "constraint_force"}
     options |= {"q0": random_configuration(model, rng), "tolerance": 1e-3}
-    loose = lw.simulate(model, solver="conjugate_gradient", solver_tolerance=1e-4, **options)
+    loose = lw.simulate(
+        model, solver="conjugate_gradient", numerics=lw.Numerics(solver_tolerance=1e-4), **options
+    )
     q, v = loose.position.values, loose.velocity.values
     exact = lw.joint_loads(model, q, v, np.zeros(model.nv))
     error = np.linalg.norm((loose.joint_load.values - exact)[..., :3], axis=-1).max(axis=0)

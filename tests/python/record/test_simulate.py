@@ -208,15 +208,26 @@ def test_progress_is_reported(chain):
         ({"method": "magic"}, "magic"),
         ({"solver": "magic", "method": "constraint_force"}, "magic"),
         (
-            {"initial_guess": "magic", "method": "constraint_force"}
-            | {"solver": "conjugate_gradient"},
+            {
+                "solver": "conjugate_gradient",
+                "numerics": lw.Numerics(initial_guess="magic", method="constraint_force"),
+            },
             "magic",
         ),
-        ({"initial_guess": "magic"}, "magic.*known are zero, previous, linear, cubic, projection"),
-        ({"stop": "magic"}, "magic.*known are paper, residual, energy_norm"),
-        ({"solver_tolerance": 0}, "solver_tolerance: 0"),
-        ({"max_iterations": 0}, "max_iterations: 0 given"),
-        ({"max_iterations": 1.5}, "max_iterations: 1.5 given"),
+        (
+            {"numerics": lw.Numerics(initial_guess="magic")},
+            "magic.*known are zero, previous, linear, cubic, projection",
+        ),
+        (
+            {"numerics": lw.Numerics(stop="magic")},
+            "magic.*known are paper, residual, energy_norm",
+        ),
+        ({"numerics": lw.Numerics(solver_tolerance=0)}, "solver_tolerance: 0"),
+        ({"numerics": lw.Numerics(max_iterations=0)}, "max_iterations: 0 given"),
+        ({"numerics": lw.Numerics(max_iterations=1.5)}, "max_iterations: 1.5 given"),
+        ({"numerics": lw.Numerics(integrator=3)}, "integrator: 3 given"),
+        ({"numerics": {"speed": 3}}, "numerics: unknown option 'speed'; known: tolerance"),
+        ({"numerics": 3}, "numerics: 3 given"),
         ({"threads": 0}, "threads: 0 given"),
         ({"step": -1}, "step: -1"),
         ({"integrator": "runge_kutta_4"}, "step"),

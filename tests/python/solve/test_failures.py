@@ -34,13 +34,16 @@ def run_until_it_stops(model, **options):
 
 
 def test_the_iteration_limit(chain):
-    message, run = run_until_it_stops(chain, solver="jacobi", max_iterations=3)
+    message, run = run_until_it_stops(
+        chain, solver="jacobi", numerics=lw.Numerics(max_iterations=3)
+    )
     assert run.outcome == "reached_max_iterations"
     assert "use solver 'thomas' or 'two_level'" in message
 
 
 def test_stagnation_at_rounding_level(chain):
-    message, run = run_until_it_stops(chain, solver="conjugate_gradient", solver_tolerance=1e-18)
+    numerics = lw.Numerics(solver_tolerance=1e-18)
+    message, run = run_until_it_stops(chain, solver="conjugate_gradient", numerics=numerics)
     assert run.outcome == "stagnated"
     assert "loosen the tolerance" in message
 

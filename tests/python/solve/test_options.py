@@ -48,7 +48,9 @@ def test_wrong_options_are_refused_in_one_line(arm, options, parts):
             assert part in message
     if isinstance(options, dict):
         with pytest.raises(lw.InputError):
-            lw.simulate(arm, duration=1.0, solver="sor", solver_options=options)
+            lw.simulate(
+                arm, duration=1.0, solver="sor", numerics=lw.Numerics(solver_options=options)
+            )
 
 
 def test_known_options_are_listed_with_their_defaults():
@@ -142,11 +144,12 @@ def test_a_trace_holds_every_evaluation(arm):
     simulation = _core.Simulation(arm, solver="conjugate_gradient")
     simulation.keep_trace()
     simulation.start(0.0, STATE[0], STATE[1])
-    done = simulation.advance([0.5], ("position",))
+    simulation.advance([0.5], ("position",))
+    done = simulation.statistics
     trace = simulation.trace()
-    assert trace["time"].size == done["evaluations"][-1]
-    assert trace["iterations"].sum() == done["iterations"][-1]
-    assert trace["accepted"].sum() == done["steps"][-1]
+    assert trace["time"].size == done.evaluations
+    assert trace["iterations"].sum() == done.iterations
+    assert trace["accepted"].sum() == done.steps
     assert np.all(trace["seconds"] > 0)
     simulation.start(0.0, STATE[0], STATE[1])
     assert simulation.trace()["time"].size == 0
@@ -167,7 +170,7 @@ def test_body_velocities_are_the_same_motion(name):
     q0 = model.neutral_configuration()
     options = {"duration": 1.0, "every": 0.25, "q0": q0, "v0": v0, "tolerance": 1e-10}
     joint, body = (
-        lw.simulate(model, **options, method="constraint_force", state=state)
+        lw.simulate(model, **options, method="constraint_force", numerics=lw.Numerics(state=state))
         for state in ("joint_rates", "body_velocities")
     )
     for quantity in ("position", "velocity", "joint_load"):
@@ -184,7 +187,7 @@ def test_a_locked_joint_stays_locked_with_body_velocities(arm):
         duration=1.0,
         v0=[0.3, 0.2, 0.0, 0.1, 0.0],
         drives={"elbow": lw.drives.Locked()},
-        state="body_velocities",
+        numerics=lw.Numerics(state="body_velocities"),
     )
     elbow = arm.q_slice("elbow")
     assert np.all(run.position.values[:, elbow] == run.position.values[0, elbow])
@@ -192,6 +195,11 @@ def test_a_locked_joint_stays_locked_with_body_velocities(arm):
 
 def test_body_velocities_need_constraint_forces(arm):
     with pytest.raises(lw.InputError, match="needs method constraint_force"):
-        lw.simulate(arm, duration=1.0, method="articulated_body", state="body_velocities")
+        lw.simulate(
+            arm,
+            duration=1.0,
+            method="articulated_body",
+            numerics=lw.Numerics(state="body_velocities"),
+        )
     with pytest.raises(lw.InputError, match="joint_rates, body_velocities"):
-        lw.simulate(arm, duration=1.0, state="momenta")
+        lw.simulate(arm, duration=1.0, numerics=lw.Numerics(state="momenta"))

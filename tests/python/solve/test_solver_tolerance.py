@@ -26,10 +26,10 @@ def follow(maneuver, solver, tolerance=TOLERANCE, **options):
     maneuver.apply_torques(model, simulation)
     simulation.start(0.0, np.array(maneuver.start), np.zeros(model.nv))
     reached = simulation.advance([DURATION], {"position", "velocity"})
-    assert reached["outcome"] == "converged"
+    assert simulation.ending.outcome == "converged"
     miss = reached["position"][-1] - np.array(maneuver.end)
     error = weighted_norm(maneuver, miss, reached["velocity"][-1], tolerance)
-    return error, int(reached["iterations"][-1])
+    return error, simulation.statistics.iterations
 
 
 @pytest.mark.parametrize("solver", ["conjugate_gradient", "rs_conjugate_gradient", "sor", "jacobi"])
@@ -81,7 +81,7 @@ def test_long_chains_that_rounding_keeps_from_the_bound_go_on():
         q0=np.full(48, 0.05),
         tolerance=1e-11,
         solver="two_level",
-        initial_guess="projection",
+        numerics=lw.Numerics(initial_guess="projection"),
     )
     direct = lw.simulate(model, duration=0.05, every=0.05, q0=np.full(48, 0.05), tolerance=1e-11)
     np.testing.assert_allclose(run.position[-1], direct.position[-1], atol=1e-8)

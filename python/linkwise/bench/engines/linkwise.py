@@ -97,8 +97,8 @@ def _simulator(model: Model, states: States, entry: dict[str, Any]) -> Simulator
         loop.start(0.0, states.q[0], states.v[0])
         found = loop.advance(np.array([duration]), {"position"})
         seconds = time.process_time() - start
-        if found["outcome"] != "converged":
-            raise RuntimeError(f"{found['outcome']} at {found['stop_time']:g} s")
-        return Motion(np.array(found["position"][-1]), seconds, int(found["evaluations"][-1]))
+        if loop.ending.outcome != "converged":
+            raise RuntimeError(f"{loop.ending.outcome} at {loop.ending.time:g} s")
+        return Motion(np.array(found["position"][-1]), seconds, loop.statistics.evaluations)
 
     return Simulator(name, fixed, simulate)

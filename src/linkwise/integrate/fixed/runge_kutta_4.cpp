@@ -4,8 +4,6 @@
 /// Between steps it is the cubic Hermite polynomial through both ends and their derivatives, whose
 /// error O(h^4) is of the order of the method. The derivative at the end is the next step's k1, so
 /// dense output costs no evaluation.
-#include "linkwise/integrate/fixed/runge_kutta_4.hpp"
-
 #include <cstddef>
 #include <vector>
 

@@ -2,8 +2,6 @@
 ///   v(t + h) = v + h vdot(t, q, v),   q(t + h) = q + h qdot(q, v(t + h)).
 /// Order 1, one evaluation a step; where the forces are conservative the energy error stays
 /// bounded. Between steps it is linear, which is what the method assumes of q.
-#include "linkwise/integrate/fixed/semi_implicit_euler.hpp"
-
 #include <cstddef>
 #include <vector>
 

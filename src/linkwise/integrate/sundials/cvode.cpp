@@ -2,8 +2,6 @@
 /// functional iteration, and backward differentiation with Newton iteration. The error test bounds
 /// the root mean square of e_i / (rtol |y_i| + atol) by 1 in every step. Output is read off the
 /// method's own interpolating polynomial, so the steps do not depend on the output times.
-#include "linkwise/integrate/sundials/cvode.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <exception>

@@ -1,0 +1,322 @@
+#include "linkwise/dynamics/evaluator.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/constraint/joint_constraint.hpp"
+#include "linkwise/dynamics/composite_rigid_body.hpp"
+#include "linkwise/dynamics/parts.hpp"
+#include "linkwise/forces/passive.hpp"
+
+namespace linkwise {
+namespace {
+
+constexpr std::pair<std::string_view, Cause> causes[] = {
+    {"gravity", Cause::gravity}, {"velocity", Cause::velocity}, {"drive", Cause::drive},
+    {"motion", Cause::motion},   {"passive", Cause::passive},   {"external", Cause::external}};
+
+void check_external(const Model& m, size_t count, const BatchInput& s) {
+  if (!s.external) return;
+  for (int j = 0; j < m.n_joints(); ++j) {
+    if (m.joints[j].last_of_body) continue;
+    for (size_t i = 0; i < count; ++i)
+      for (int k = 0; k < 6; ++k)
+        if (s.external[(i * m.n_joints() + j) * 6 + k] != 0)
+          throw InputError(
+              "body '" + m.links[m.joints[j].link].name + "'" + m.where() +
+              " has no mass, so no wrench can act on it; apply it to the next body outboard");
+  }
+}
+
+void check(const Model& m, size_t count, const BatchInput& s) {
+  check_external(m, count, s);
+  if (!std::isfinite(s.gravity_factor))
+    throw InputError("gravity is not finite; give a factor, 1 for the model's gravity, 0 for none");
+}
+
+void check_prescribed(const Model& m, const BatchInput& s) {
+  if (s.du && m.spec().prescribed.empty())
+    throw InputError(
+        "prescribed: the model has no joint of given motion; use model.prescribe([...])");
+}
+
+/// tau, null for none, with the model's passive forces added, one row per state.
+std::vector<double> with_passive(const Model& m, size_t count, const BatchInput& s,
+                                 const double* tau) {
+  std::vector<double> total(count * m.nv());
+  if (tau) std::copy(tau, tau + total.size(), total.begin());
+  const std::vector<double> rest(m.nv());
+  for (size_t i = 0; i < count; ++i)
+    add_passive_forces(m, s.q + i * m.nq(), s.v ? s.v + i * m.nv() : rest.data(),
+                       total.data() + i * m.nv());
+  return total;
+}
+
+/// Keeps the body furthest outboard of those at which parts failed, whatever their order in time.
+class FailedBody {
+ public:
+  void add(int body) {
+    for (int seen = body_; body > seen && !body_.compare_exchange_weak(seen, body);) {
+    }
+  }
+  void write(EvaluationReport& report) const {
+    if (body_ < 0) return;
+    report.outcome = Outcome::not_positive_definite;
+    report.body = body_;
+  }
+
+ private:
+  std::atomic<int> body_{-1};
+};
+
+/// Every state by one method, one after the other.
+void one_by_one(const Model& m, DynamicsMethod& method, size_t count, const BatchInput& s,
+                const ForwardOutput& out, EvaluationReport& report, const GoOn& go_on) {
+  const std::vector<double> zero(m.nv());
+  for (size_t i = 0; i < count && go_on(); ++i) {
+    SweepInput<double> in;
+    in.q = s.q + i * m.nq();
+    in.v = s.v ? s.v + i * m.nv() : zero.data();
+    in.tau = s.tau ? s.tau + i * m.nv() : zero.data();
+    in.external = s.external ? s.external + i * 6 * m.n_joints() : nullptr;
+    in.prescribed = s.du ? s.du + i * m.nv() : zero.data();
+    in.gravity_factor = s.gravity_factor;
+    const DynamicsReport r =
+        method.evaluate(0, in, out.acceleration + i * m.nv(),
+                        out.joint_load ? out.joint_load + i * 6 * m.n_joints() : nullptr);
+    report.iterations = std::max(report.iterations, r.iterations);
+    report.error_estimate = std::max(report.error_estimate, r.error_estimate);
+    if (!r.ok()) {
+      report.outcome = r.outcome;
+      if (r.body >= 0) report.body = r.body;
+    }
+    if (out.constraint_force)
+      out.constraint_force->insert(out.constraint_force->end(), method.constraint_force().begin(),
+                                   method.constraint_force().end());
+  }
+}
+
+}  // namespace
+
+DynamicsOptions evaluation_options() {
+  DynamicsOptions options;
+  options.solver_options.tolerance = 1e-12;
+  return options;
+}
+
+std::string failure_text(const Model& model, const EvaluationReport& report) {
+  const Choice& by = report.choice;
+  return "method " + by.method + (by.solver.empty() ? "" : " with solver " + by.solver) + ": " +
+         std::string(message(report.outcome)) +
+         (report.body < 0 ? ""
+                          : " at body '" + model.body_name(report.body) + "'" + model.where()) +
+         "; " + std::string(remedy(report.outcome));
+}
+
+std::vector<Cause> causes_from_names(std::span<const std::string> names) {
+  std::vector<Cause> found;
+  for (const std::string& name : names) {
+    const auto* entry = std::find_if(std::begin(causes), std::end(causes),
+                                     [&](const auto& known) { return name == known.first; });
+    if (entry == std::end(causes)) {
+      std::string known;
+      for (const auto& [other, cause] : causes)
+        known += (known.empty() ? "" : ", ") + std::string(other);
+      throw InputError("cause '" + name + "' is unknown; known: " + known);
+    }
+    found.push_back(entry->second);
+  }
+  return found;
+}
+
+/// What one call needs beside its arguments; kept, so that the next one allocates nothing.
+struct Evaluator::Workspace {
+  explicit Workspace(const Model& m) : model(m), batch(m) {}
+
+  /// What "auto" stands for with all options left alone, and why.
+  const Choice& default_choice() {
+    if (choice.method.empty()) choice = choose_dynamics(model, {});
+    return choice;
+  }
+  /// Does one state have a method of its own, not that of a batch?
+  bool is_cut() {
+    if (cut < 0) cut = linkwise::is_cut(model);
+    return cut > 0;
+  }
+  DynamicsMethod& kept_method(const std::string& name, int threads) {
+    if (!method || method_name != name || method_threads != threads) {
+      DynamicsOptions options;
+      options.method = method_name = name;
+      options.threads = method_threads = threads;
+      method = make_dynamics(model, options);
+    }
+    return *method;
+  }
+
+  const Model& model;
+  BatchEvaluator batch;
+  std::unique_ptr<CompositeRigidBody> composite;
+  std::unique_ptr<DynamicsMethod> method;
+  std::string method_name;
+  Choice choice;
+  int method_threads = 0, cut = -1;
+};
+
+/// Borrows a workspace and gives it back at the end of its life.
+class Evaluator::Lease {
+ public:
+  explicit Lease(const Evaluator& owner) : owner_(owner) {
+    const std::lock_guard lock(owner.mutex_);
+    if (owner.pool_.empty()) owner.pool_.push_back(std::make_unique<Workspace>(*owner.model_));
+    workspace_ = std::move(owner.pool_.back());
+    owner.pool_.pop_back();
+  }
+  ~Lease() {
+    const std::lock_guard lock(owner_.mutex_);
+    owner_.pool_.push_back(std::move(workspace_));
+  }
+  Lease(const Lease&) = delete;
+  Lease& operator=(const Lease&) = delete;
+  Workspace& operator*() { return *workspace_; }
+  Workspace* operator->() { return workspace_.get(); }
+
+ private:
+  const Evaluator& owner_;
+  std::unique_ptr<Workspace> workspace_;
+};
+
+Evaluator::Evaluator(const Model& model) : model_(&model) {}
+Evaluator::~Evaluator() = default;
+
+/// What computes the states: a method one by one, or else a kernel on lanes.
+struct Evaluator::Pick {
+  DynamicsMethod* method = nullptr;
+  BatchMethod on_lanes = BatchMethod::articulated_body;
+  std::unique_ptr<DynamicsMethod> own;  ///< of this call alone
+};
+
+Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const DynamicsOptions& options,
+                                bool forces, Choice& choice) const {
+  Pick picked;
+  const bool is_auto = options.method == "auto";
+  // This path builds no text: that would take as long as the dynamics of a small machine.
+  if ((is_auto || options.method == "articulated_body") && options.solver == "auto") {
+    const bool alone = count == 1 && workspace.is_cut();
+    const Choice& by_default = workspace.default_choice();
+    choice.method = alone && is_auto ? by_default.method : "articulated_body";
+    if (alone && is_auto) choice.solver = by_default.solver;
+    if (alone) picked.method = &workspace.kept_method(choice.method, options.threads);
+    if (forces)
+      choice.reason = !is_auto                             ? "as asked for"
+                      : choice.method == by_default.method ? by_default.reason
+                                                           : "many states, side by side in lanes";
+    return picked;
+  }
+  choice = choose_dynamics(*model_, options);
+  static const SolverOptions usual = evaluation_options().solver_options;
+  if (count > 1 && !forces && choice.method == "constraint_force" && choice.solver == "thomas" &&
+      options.solver_options == usual) {
+    require_regular_inertias(*model_);
+    picked.on_lanes = BatchMethod::constraint_force;
+  } else {
+    picked.own = make_dynamics(*model_, options);
+    picked.method = picked.own.get();
+  }
+  return picked;
+}
+
+EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& states,
+                                             const DynamicsOptions& options,
+                                             const ForwardOutput& out, const GoOn& go_on) const {
+  const Model& m = *model_;
+  check(m, count, states);
+  check_prescribed(m, states);
+  EvaluationReport report;
+  Lease workspace(*this);
+  const Pick picked =
+      pick(*workspace, count, options, out.constraint_force != nullptr, report.choice);
+  BatchInput s = states;
+  std::vector<double> torques;
+  if (states.passive_acts && m.has_passive_forces())
+    torques = with_passive(m, count, states, states.tau);
+  else if (!states.tau)
+    torques.assign(count * m.nv(), 0.0);
+  if (!torques.empty()) s.tau = torques.data();
+  if (picked.method) {
+    one_by_one(m, *picked.method, count, s, out, report, go_on);
+    return report;
+  }
+  FailedBody failed;
+  const auto part = [&](BatchEvaluator& batch, size_t first, size_t n) {
+    failed.add(batch.forward_dynamics(
+        n, s.from(m, first), out.acceleration + first * m.nv(),
+        out.joint_load ? out.joint_load + first * 6 * m.n_joints() : nullptr, picked.on_lanes));
+  };
+  for_each_part(m, count, Executor(options.threads), go_on, [&](size_t first, size_t n) {
+    if (n == count) return part(workspace->batch, first, n);
+    Lease own(*this);
+    part(own->batch, first, n);
+  });
+  failed.write(report);
+  return report;
+}
+
+EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& states,
+                                           std::span<const Cause> causes, const std::string& method,
+                                           const Executor& executor, double* loads,
+                                           const GoOn& go_on) const {
+  const Model& m = *model_;
+  check(m, count, states);
+  check_prescribed(m, states);
+  if (method != "articulated_body" && method != "constraint_force")
+    throw InputError("method '" + method +
+                     "' does not split loads; use articulated_body or constraint_force");
+  const bool by_force = method == "constraint_force";
+  if (by_force) require_regular_inertias(m);
+  BatchInput s = states;
+  std::vector<double> passive;
+  if (std::find(causes.begin(), causes.end(), Cause::passive) != causes.end()) {
+    passive = with_passive(m, count, states, nullptr);
+    s.passive = passive.data();
+  }
+  const size_t width = causes.size() * 6 * m.n_joints();
+  FailedBody failed;
+  for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
+    Lease workspace(*this);
+    failed.add(workspace->batch.loads_by_cause(
+        n, s.from(m, first), causes, loads + first * width,
+        by_force ? BatchMethod::constraint_force : BatchMethod::articulated_body));
+  });
+  EvaluationReport report;
+  report.choice.method = method;
+  failed.write(report);
+  return report;
+}
+
+void Evaluator::inverse_dynamics(size_t count, const BatchInput& states, const Executor& executor,
+                                 double* tau, double* loads, const GoOn& go_on) const {
+  const Model& m = *model_;
+  check(m, count, states);
+  for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
+    Lease workspace(*this);
+    workspace->batch.inverse_dynamics(n, states.from(m, first),
+                                      tau ? tau + first * m.nv() : nullptr,
+                                      loads ? loads + first * 6 * m.n_joints() : nullptr);
+  });
+}
+
+void Evaluator::mass_matrix(size_t count, const double* q, const Executor& executor, double* H,
+                            const GoOn& go_on) const {
+  const Model& m = *model_;
+  const size_t nv = m.nv();
+  for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
+    Lease workspace(*this);
+    if (!workspace->composite) workspace->composite = std::make_unique<CompositeRigidBody>(m);
+    for (size_t i = first; i < first + n; ++i)
+      workspace->composite->mass_matrix(q + i * m.nq(), H + i * nv * nv);
+  });
+}
+
+}  // namespace linkwise

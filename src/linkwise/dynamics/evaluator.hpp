@@ -1,0 +1,89 @@
+#pragma once
+// Everything that is computed of given states: accelerations and joint loads, torques of a motion,
+// loads by cause. One place decides what computes them, by what was asked for and how many states
+// there are:
+//     one state     the method of the table that "auto" stands for: cut into pieces, paths or
+//                   branches where the machine is large enough, plain otherwise
+//     many states   articulated_body, or constraint_force with thomas, on SIMD lanes; every other
+//                   method state by state
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "linkwise/dynamics/batch.hpp"
+#include "linkwise/dynamics/forward_dynamics.hpp"
+#include "linkwise/dynamics/parts.hpp"
+
+namespace linkwise {
+
+/// Options of an evaluation that stands alone: no integrator says how accurate it must be.
+DynamicsOptions evaluation_options();
+
+/// How an evaluation went: the worst of its states, and what computed them.
+struct EvaluationReport {
+  Outcome outcome = Outcome::converged;
+  Choice choice;  ///< the reason only where constraint forces are asked for
+  int body = -1;  ///< at which it failed
+  int iterations = 0;
+  double error_estimate = 0;  ///< relative A-norm error of the constraint forces
+
+  bool ok() const { return outcome == Outcome::converged; }
+};
+
+/// One line: the method, what happened, where, and the remedy.
+std::string failure_text(const Model& model, const EvaluationReport& report);
+
+/// Where forward dynamics goes. Loads and forces that are null are not computed.
+struct ForwardOutput {
+  double* acceleration = nullptr;                   ///< [count][nv]
+  double* joint_load = nullptr;                     ///< [count][n_joints][6]
+  std::vector<double>* constraint_force = nullptr;  ///< [count][unknowns]; empty without any
+};
+
+/// InputError, listing the known names, when one is unknown.
+std::vector<Cause> causes_from_names(std::span<const std::string> names);
+
+/// Evaluations of one model, which must outlive it. Calls from several threads at once each borrow
+/// a workspace, and repeated calls allocate none. All throw InputError where the states ask for
+/// what the model has not: a wrench on a link without mass, accelerations of joints that are free.
+class Evaluator {
+ public:
+  explicit Evaluator(const Model& model);
+  ~Evaluator();
+  Evaluator(const Evaluator&) = delete;
+  Evaluator& operator=(const Evaluator&) = delete;
+
+  /// Threads are those of the options.
+  EvaluationReport forward_dynamics(size_t count, const BatchInput& in,
+                                    const DynamicsOptions& options, const ForwardOutput& out,
+                                    const GoOn& go_on) const;
+
+  /// loads [count][causes][n_joints][6]; the method is articulated_body or constraint_force.
+  EvaluationReport loads_by_cause(size_t count, const BatchInput& in, std::span<const Cause> causes,
+                                  const std::string& method, const Executor& executor,
+                                  double* loads, const GoOn& go_on) const;
+
+  /// tau [count][nv] and loads [count][n_joints][6] of the accelerations states.du; either may be
+  /// null.
+  void inverse_dynamics(size_t count, const BatchInput& in, const Executor& executor, double* tau,
+                        double* loads, const GoOn& go_on) const;
+
+  /// H [count][nv][nv].
+  void mass_matrix(size_t count, const double* q, const Executor& executor, double* H,
+                   const GoOn& go_on) const;
+
+ private:
+  struct Workspace;
+  class Lease;
+  struct Pick;
+  Pick pick(Workspace& workspace, size_t count, const DynamicsOptions& options, bool forces,
+            Choice& choice) const;
+
+  const Model* model_;
+  mutable std::mutex mutex_;
+  mutable std::vector<std::unique_ptr<Workspace>> pool_;
+};
+
+}  // namespace linkwise

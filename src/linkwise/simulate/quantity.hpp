@@ -1,0 +1,73 @@
+#pragma once
+// What a simulation records: one table from which the samples are written, and from which Python
+// takes names, shapes, units and texts.
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "linkwise/integrate/integrator.hpp"
+#include "linkwise/model/model.hpp"
+
+namespace linkwise {
+
+struct SimulationStatistics : IntegratorStatistics {
+  long iterations = 0;
+};
+
+/// One member at one time, as the writers of the table see it.
+struct Instant {
+  const Model& model;
+  const double *q, *v;
+  const double *du, *joint_load, *drive_torque;
+  const double* external;  ///< null: nothing acts
+  const SimulationStatistics& statistics;
+};
+
+/// Along what a quantity has its columns: the coordinates [nq], the rates [nv], the joints
+/// [n_joints][6], the bodies that they carry [n_joints][6], or nothing [1].
+enum class Axis { coordinates, rates, joints, bodies, none };
+std::string_view to_string(Axis axis);
+
+/// What has to be computed before it can be written.
+enum class Needs { state, forces, loads };
+
+struct QuantityEntry {
+  std::string_view name;
+  std::string_view group;  ///< the name by which users ask for it
+  Axis axis;
+  Needs needs;
+  bool of_members;  ///< also recorded where many simulations run at once
+  /// Per axis rates and coordinates: what follows the unit of the coordinate; else the unit.
+  std::string_view units;
+  std::string_view long_name, frame, point, convention;
+  void (*write)(const Instant&, double*);  ///< or null, where it is a whole number:
+  long (*count)(const Instant&);
+};
+
+/// In the order in which data sets list them.
+std::span<const QuantityEntry> quantity_table();
+/// Its place in the table; InputError where there is none of that name.
+size_t quantity_index(std::string_view name);
+/// Numbers per member and time.
+size_t quantity_width(const QuantityEntry& entry, const Model& model);
+
+/// Where samples go, by place in the table; null pointers are not computed. Rows of one member are
+/// next to each other.
+struct Sample {
+  static constexpr size_t size = 16;  ///< at least that of the table
+  std::array<double*, size> values{};
+  std::array<std::int64_t*, size> counts{};
+  size_t rows = 1;  ///< from one member to the next
+
+  /// By name, such as sample["position"].
+  double*& operator[](std::string_view name) { return values[quantity_index(name)]; }
+
+  bool needs(Needs needs) const;
+  /// The same arrays from row `row` of member `member` on.
+  Sample at(const Model& model, size_t member, size_t row) const;
+  /// One row of one member; NaN, or -1 where whole numbers are counted, where it has ended.
+  void write(const Model& model, size_t member, const Instant* instant) const;
+};
+
+}  // namespace linkwise

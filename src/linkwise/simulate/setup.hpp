@@ -1,0 +1,53 @@
+#pragma once
+// What all members of a simulation have in common: the machine, what drives it, and the numerics.
+#include <memory>
+#include <vector>
+
+#include "linkwise/dynamics/forward_dynamics.hpp"
+#include "linkwise/forces/drive.hpp"
+#include "linkwise/integrate/integrator.hpp"
+
+namespace linkwise {
+
+/// What is integrated beside the joint coordinates.
+enum class StateChoice {
+  joint_rates,
+  body_velocities,  ///< the paper's: absolute velocities of the bodies [sharf1993]
+};
+
+/// InputError, listing the known names, when the name is unknown.
+StateChoice state_choice_from_name(std::string_view name);
+
+struct SimulationOptions {
+  DynamicsOptions dynamics;
+  StateChoice state = StateChoice::joint_rates;
+  /// The energy-norm rule of an iterative solver follows the integrator's error test, where it has
+  /// one: see SolverTolerance. Otherwise its tolerance is that of the solver options.
+  bool follow_error_test = false;
+  std::string integrator = "adams";
+  IntegratorOptions integration;
+};
+
+struct Setup {
+  /// InputError where options are out of range or do not fit the model.
+  Setup(std::shared_ptr<const Model> model, SimulationOptions options);
+
+  std::shared_ptr<const Model> model;  ///< as the user sees it
+  SimulationOptions options;
+  Choice choice;
+  std::vector<Drive> drives;  ///< one per joint
+  std::vector<Wrench> wrenches;
+
+  /// Settles what follows from the drives: before the first start, and after a drive has changed.
+  void settle();
+  /// The model with the joints of given motion prescribed.
+  const Model& driven() const { return driven_ ? *driven_ : *model; }
+  bool any_given() const { return driven_ != nullptr; }
+  bool any_motion() const { return any_motion_; }
+
+ private:
+  std::unique_ptr<const Model> driven_;
+  bool any_motion_ = false;
+};
+
+}  // namespace linkwise
