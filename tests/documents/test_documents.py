@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
 COMMAND_LINE = "import sys; sys.argv[0] = 'linkwise'; from linkwise.cli import main; main()"
-LONGEST = 60  # seconds, on a busy machine; an example alone takes less than 10
+LONGEST = 600  # seconds: a fuse; an example alone takes less than 10
 
 
 def blocks(document, language):

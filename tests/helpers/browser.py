@@ -1,6 +1,6 @@
 """The headless Chromium of the browser tests."""
 
-PATIENCE = 180  # seconds
+PATIENCE = 600  # seconds: a fuse
 WINDOW = {"width": 900, "height": 560}
 CHROMIUMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # Drawn by the processor: the machines that run tests have no display and no GPU.

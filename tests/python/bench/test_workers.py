@@ -24,6 +24,7 @@ from linkwise.bench.race import race, write_case
 
 COUNT = 5
 GIB = 2**30
+FUSE = 600  # seconds: no answer takes as long, on no machine
 
 
 def floating_tree():
@@ -70,15 +71,15 @@ def test_every_engine_is_given_the_same_machine(engine, machine, tmp_path):
     write_case(machine, states, tmp_path)
     expected = lw.forward_dynamics(machine.model, *(states.q, states.v, states.tau))
     with python_worker(engine.name, memory=memory_limit()) as worker:
-        built = worker.ask("build", str(tmp_path), timeout=60)
+        built = worker.ask("build", str(tmp_path), timeout=FUSE)
         assert built["states"] == COUNT
         for offer in built["contestants"]:
-            worker.ask("check", offer["method"], str(tmp_path / "a"), timeout=60)
+            worker.ask("check", offer["method"], str(tmp_path / "a"), timeout=FUSE)
             found = np.fromfile(tmp_path / "a").reshape(expected.shape)
             np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
-            answer = worker.ask("time", offer["method"], "2", timeout=60)
+            answer = worker.ask("time", offer["method"], "2", timeout=FUSE)
             assert answer["cpu"] > 0
-            assert 0 < answer["seconds"] < 60
+            assert answer["seconds"] > 0
 
 
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda engine: engine.name)
@@ -95,10 +96,10 @@ def test_every_integrator_ends_in_the_same_place(engine, tmp_path):
         tolerance=1e-12,
     ).position.values[-1]
     with python_worker(engine.name, memory=memory_limit()) as worker:
-        for simulator in worker.ask("build", str(tmp_path), timeout=60)["simulators"]:
+        for simulator in worker.ask("build", str(tmp_path), timeout=FUSE)["simulators"]:
             setting = "1e-4" if simulator["fixed_step"] else "1e-10"
             lines = ("simulate", simulator["method"], "0.25", setting, str(tmp_path / "q"))
-            worker.ask(*lines, timeout=60)
+            worker.ask(*lines, timeout=FUSE)
             first_order = simulator["method"] == "semi_implicit_euler"
             error = np.abs(np.fromfile(tmp_path / "q") - end).max()
             assert error < (1e-2 if first_order else 1e-7), simulator["method"]
@@ -135,14 +136,14 @@ def program(text):
         ("import os; os.abort()", "killed by SIGABRT"),
         ("import sys; sys.exit('the library is broken')", "the library is broken"),
         ("input(); raise SystemExit(3)", "ended with status 3"),
-        ("import time; time.sleep(60)", "takes more than 0.5 s"),
+        ("import time; time.sleep(600)", "takes more than 0.5 s"),
         ('input(); print(\'{"error": "no such joint"}\')', "no such joint"),
         ('input(); print(\'{"error": "out of memory"}\')', "needs more than 1.0 GiB of memory"),
     ],
 )
 def test_why_a_worker_failed(text, reason):
     with program(text) as worker, pytest.raises(WorkerError) as failed:
-        worker.ask("build", timeout=0.5 if "sleep" in text else 30)
+        worker.ask("build", timeout=0.5 if "sleep" in text else FUSE)
     assert str(failed.value) == reason
 
 
@@ -151,9 +152,9 @@ def test_memory_is_bounded(tmp_path):
     machine = random_chain(100)
     write_case(machine, random_states(machine, 4096), tmp_path)
     with python_worker("linkwise", memory=2**26) as worker:
-        worker.ask("build", str(tmp_path), timeout=60)
+        worker.ask("build", str(tmp_path), timeout=FUSE)
         with pytest.raises(WorkerError, match=r"needs more than 0\.1 GiB of memory"):
-            worker.ask("time", "batch", "1", timeout=60)
+            worker.ask("time", "batch", "1", timeout=FUSE)
         assert not worker.alive  # what it had is free again
 
 
@@ -162,11 +163,11 @@ def test_what_is_allowed_can_be_less_than_at_the_start(tmp_path):
     machine = random_chain(100)
     write_case(machine, random_states(machine, 4096), tmp_path)
     with python_worker("linkwise", memory=2**31) as worker:
-        worker.ask("build", str(tmp_path), timeout=60)
-        worker.ask("time", "auto", "1", timeout=60)
+        worker.ask("build", str(tmp_path), timeout=FUSE)
+        worker.ask("time", "auto", "1", timeout=FUSE)
         worker.allow(2**26)
         with pytest.raises(WorkerError, match=r"needs more than 0\.1 GiB of memory"):
-            worker.ask("time", "batch", "1", timeout=60)
+            worker.ask("time", "batch", "1", timeout=FUSE)
 
 
 def test_a_box_is_built_again_after_its_worker_died(tmp_path):
@@ -176,7 +177,7 @@ def test_a_box_is_built_again_after_its_worker_died(tmp_path):
         box = Box(pits, ENGINES[0], PYTHON, tmp_path)
         box.build()
         pits.worker(ENGINES[0], PYTHON).close()
-        assert box.ask("time", "auto", "1", timeout=30)["cpu"] > 0
+        assert box.ask("time", "auto", "1", timeout=FUSE)["cpu"] > 0
 
 
 def test_wrong_answers_are_not_timed():

@@ -12,7 +12,7 @@ def hub():
     """A body with three outboard joints: Jacobi diverges there, and it is no chain."""
     model = lw.scenes.tree(13, branching=3, joint="universal")
     motion = compare.free_trajectory(model, states=3, seed=0)
-    return compare.compare(model, motion, time_limit=1.0)
+    return compare.compare(model, motion, time_limit=600.0)
 
 
 def rows_of(found, solver):
@@ -55,12 +55,12 @@ def test_errors_are_against_the_recursion(hub):
 def test_what_takes_too_long_is_stopped_and_shown():
     model = lw.scenes.chain(64, axes="parallel")
     motion = compare.free_trajectory(model, states=2, seed=0)
-    found = compare.compare(model, motion, time_limit=1e-3)
+    found = compare.compare(model, motion, time_limit=1e-9)
     assert found["unknowns"] == 320
     slow = [row for row in found["rows"] if row["outcome"] == "too slow"]
     assert slow
     for row in slow:
-        assert "0.001 s" in row["message"]
+        assert "1e-09 s" in row["message"]
 
 
 def test_a_singular_inertia_leaves_the_other_methods():

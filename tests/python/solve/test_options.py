@@ -130,9 +130,8 @@ def test_an_evaluator_stops_at_its_time_limit():
     model = lw.scenes.chain(200, axes="parallel")
     times = np.linspace(0.1, 1.0, 50)
     q, v, tau, _ = motion(model, times)
-    found = lw.Evaluator(model, solver="jacobi").follow(times, q, v, tau, time_limit=1e-4)
-    assert 1 <= len(found["outcome"]) < 50
-    assert len(found["acceleration"]) == len(found["outcome"])
+    found = lw.Evaluator(model, solver="jacobi").follow(times, q, v, tau, time_limit=1e-9)
+    assert len(found["outcome"]) == len(found["acceleration"]) == 1
 
 
 def test_an_evaluator_wants_a_time_a_state(arm):

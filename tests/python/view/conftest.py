@@ -92,13 +92,13 @@ def serve():
         )
         thread.start()
         threads.append(thread)
-        assert ready.wait(60), "the view did not start"
+        assert ready.wait(PATIENCE), "the view did not start"
         return addresses[0]
 
     yield start
     stop.set()
     for thread in threads:
-        thread.join(30)
+        thread.join(PATIENCE)
         assert not thread.is_alive()
 
 
