@@ -1,6 +1,6 @@
 """Simulations of chains of 100,000 and 1,000,000 links: time, peak memory, and are they right?
 
-    python benchmarks/huge_chains.py [-o benchmarks/results]
+    python -m benchmarks huge_chains [-o DIR]
 
 A chain of rods of 1 m and 1 kg, hinges about x and y in turn, is held out straight from its upper
 end and let go. Its far end does not know of the hinge yet and falls freely, by g t^2 / 2; energy
@@ -13,25 +13,21 @@ from __future__ import annotations
 
 import argparse
 import json
-import resource
-import subprocess
-import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import linkwise as lw
-from linkwise.record.provenance import versions
+from benchmarks import study
 
 G = 9.81
-CASES = {
+CASES: dict[int, dict[str, Any]] = {
     100_000: {"times": [0.0, 1.0], "step_tolerance": 1e-6},
     1_000_000: {"times": [0.0, 0.01], "integrator": "runge_kutta_4", "step": 2e-3},
 }
 #: What the process takes without any chain.
-EMPTY = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+EMPTY = study.peak_bytes()
 
 
 def simulate(n: int) -> dict[str, Any]:
@@ -49,7 +45,7 @@ def simulate(n: int) -> dict[str, Any]:
     # Against the start: a million turned frames in a row round the height by some 1e-5 m.
     tips = lw.link_poses(model, run.position.values[[0, -1]])[:, -1] @ [0, 0, -1.0, 1]
     energy = (run.kinetic_energy + run.potential_energy).values
-    peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    peak = study.peak_bytes()
     evaluations = int(run.evaluations[-1])
     return {
         "links": n,
@@ -67,63 +63,41 @@ def simulate(n: int) -> dict[str, Any]:
         "free_fall": G * end**2 / 2,
         "energy_drift": float((energy[-1] - energy[0]) / run.kinetic_energy.values[-1]),
         "method": run.attrs["method"],
-        "cpu_target": run.attrs["cpu_target"],
     }
+
+
+SHOWN: study.Columns = {
+    "simulated": lambda r: f"{r['simulated_seconds']:g} s, {r['integrator']}",
+    "method": lambda r: r["method"],
+    "steps, evaluations": lambda r: f"{r['steps']}, {r['evaluations']}",
+    "model built in": lambda r: f"{r['build_seconds']:.2f} s",
+    "simulated in": lambda r: f"{r['seconds']:.1f} s",
+    "processor time, labels of the results included": lambda r: f"{r['processor_seconds']:.0f} s",
+    "peak memory": lambda r: f"{r['peak_bytes'] / 2**30:.2f} GiB",
+    "bytes a link": lambda r: f"{r['peak_bytes_per_link']:.0f}",
+    "tip fell": lambda r: f"{r['tip_fell']:.9g} m of {r['free_fall']:.9g} m",
+    "energy drift": lambda r: f"{r['energy_drift']:.1e} of the kinetic energy",
+}
 
 
 def markdown(rows: list[dict[str, Any]]) -> str:
-    heads = {
-        "links": lambda r: f"{r['links']:,}",
-        "simulated": lambda r: f"{r['simulated_seconds']:g} s, {r['integrator']}",
-        "method": lambda r: r["method"],
-        "steps, evaluations": lambda r: f"{r['steps']}, {r['evaluations']}",
-        "model built in": lambda r: f"{r['build_seconds']:.2f} s",
-        "simulated in": lambda r: f"{r['seconds']:.1f} s",
-        "processor time, labels of the results included": lambda r: (
-            f"{r['processor_seconds']:.0f} s"
-        ),
-        "peak memory": lambda r: f"{r['peak_bytes'] / 2**30:.2f} GiB",
-        "bytes a link": lambda r: f"{r['peak_bytes_per_link']:.0f}",
-        "tip fell": lambda r: f"{r['tip_fell']:.9g} m of {r['free_fall']:.9g} m",
-        "energy drift": lambda r: f"{r['energy_drift']:.1e} of the kinetic energy",
-    }
-    lines = ["| | " + " | ".join(f"{r['links']:,} links" for r in rows) + " |"]
-    lines.append("|---|" + "---:|" * len(rows))
-    for head, show in list(heads.items())[1:]:
-        lines.append(f"| {head} | " + " | ".join(show(r) for r in rows) + " |")
-    return "\n".join(lines)
+    """A column per chain."""
+    columns: dict[str, Any] = {"": lambda line: line[0]}
+    for k, row in enumerate(rows):
+        columns[f"{row['links']:,} links"] = lambda line, k=k: line[1][k]
+    lines = [(name, [show(row) for row in rows]) for name, show in SHOWN.items()]
+    return study.table(lines, columns)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "results")
+    parser = study.parser(__doc__)
     parser.add_argument("--links", type=int, help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
-    if arguments.links:
-        print(json.dumps(simulate(arguments.links)))
+    asked = parser.parse_args()
+    if asked.links:
+        print(json.dumps(simulate(asked.links)))
         return
-    rows = []
-    for n in CASES:
-        done = subprocess.run(
-            [sys.executable, __file__, "--links", str(n)],
-            stdout=subprocess.PIPE,
-            text=True,
-            check=True,
-        )
-        rows.append(json.loads(done.stdout))
+    rows = [study.in_own_process("huge_chains", "--links", n) for n in CASES]
     for row in rows:
         if abs(row["tip_fell"] - row["free_fall"]) > 1e-4 or abs(row["energy_drift"]) > 1e-4:
             raise SystemExit(f"{row['links']} links do not fall as they must: {row}")
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    text = markdown(rows)
-    (arguments.output / "huge_chains.json").write_text(
-        json.dumps({"versions": versions(), "rows": rows}, indent=1) + "\n", encoding="utf-8"
-    )
-    (arguments.output / "huge_chains.md").write_text(
-        f"{text}\n\n`python benchmarks/huge_chains.py`\n", encoding="utf-8"
-    )
-    print(text)
-
-
-if __name__ == "__main__":
-    main()
+    study.write(asked.output, "huge_chains", markdown(rows), rows)

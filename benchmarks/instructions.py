@@ -1,35 +1,32 @@
 """Instructions and time a body of one evaluation: what a method asks of the processor.
 
-    python benchmarks/instructions.py [-o benchmarks/results] [--sizes 7 30 300]
+    python -m benchmarks instructions [--sizes 7 30 300] [-o DIR]
 
-Runs the C++ worker of `linkwise bench`, which must have been compiled by it, with its chains and
-methods: once as it is, for the time (of the processor, the best of seven), and under valgrind, for
-the instructions (two counts that differ in the number of calls alone are subtracted). Instructions
-a nanosecond, divided by the clock in GHz, are instructions a cycle: near the width of the
-processor, a method is bound by its instructions, far below by the latency of its recursion or by
-memory. Writes instructions.json and instructions.md.
+Runs the C++ worker of `peers`, which must have been compiled by it, with its chains and methods:
+once as it is, for the time (of the processor, the best of seven), and under valgrind, for the
+instructions (two counts that differ in the number of calls alone are subtracted). Instructions a
+nanosecond, divided by the clock in GHz, are instructions a cycle: near the width of the processor,
+a method is bound by its instructions, far below by the latency of its recursion or by memory.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
-from linkwise.bench.compiling import compile_worker
-from linkwise.bench.engines.table import BY_NAME
-from linkwise.bench.machine import random_chain, random_states
-from linkwise.bench.process import MOST_MEMORY
-from linkwise.bench.race import write_case
+from benchmarks import study
+from benchmarks.compiling import compile_worker
+from benchmarks.engines.table import BY_NAME
+from benchmarks.machine import random_chain, random_states
+from benchmarks.process import MOST_MEMORY
+from benchmarks.race import write_case
 
-ROOT = Path(__file__).resolve().parents[1]
 STATES = 64
 BODIES = 30_000  # in the shorter count: startup must not matter
 ENGINES = ("linkwise", "pinocchio")
@@ -82,32 +79,26 @@ def measure(program: Path, engine: str, folder: Path, offer: dict[str, Any], n: 
     }
 
 
-def markdown(rows: list[dict[str, Any]]) -> str:
-    lines = [
-        "| | bodies | instructions a body | ns a body | instructions a ns |",
-        "|---|---:|---:|---:|---:|",
-    ]
-    lines += [
-        f"| {row['engine']} {row['method']}{', loads' if row['loads'] else ''} "
-        f"| {row['n_bodies']} | {row['instructions_per_body']:.0f} | {row['ns_per_body']:.0f} "
-        f"| {row['instructions_per_ns']:.1f} |"
-        for row in rows
-    ]
-    return "\n".join(lines)
+COLUMNS: study.Columns = {
+    "": lambda r: f"{r['engine']} {r['method']}{', loads' if r['loads'] else ''}",
+    "bodies": lambda r: r["n_bodies"],
+    "instructions a body": lambda r: f"{r['instructions_per_body']:.0f}",
+    "ns a body": lambda r: f"{r['ns_per_body']:.0f}",
+    "instructions a ns": lambda r: f"{r['instructions_per_ns']:.1f}",
+}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "results")
+    parser = study.parser(__doc__)
     parser.add_argument("--sizes", type=int, nargs="+", default=[7, 30, 300])
-    arguments = parser.parse_args()
-    compiled = compile_worker(sources=ROOT, build=None, only_if_ready=True, say=print)
+    asked = parser.parse_args()
+    compiled = compile_worker(build=None, only_if_ready=True, say=study.say)
     if compiled.program is None:
         raise SystemExit(f"no C++ worker: {compiled.reason}")
     if not shutil.which("valgrind"):
         raise SystemExit("there is no valgrind here")
     rows = []
-    for n in arguments.sizes:
+    for n in asked.sizes:
         machine = random_chain(n)
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
@@ -118,17 +109,7 @@ def main() -> None:
                 (built,), _ = ask(compiled.program, engine, "build", folder)
                 for offer in built["contestants"]:
                     if offer["threads"] == 1:
-                        print(f"chain of {n}: {engine} {offer['method']}", file=sys.stderr)
+                        study.say(f"chain of {n}: {engine} {offer['method']}")
                         rows.append(measure(compiled.program, engine, folder, offer, n))
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    text = markdown(rows)
-    about = json.dumps({"flags": compiled.flags, "rows": rows}, indent=1)
-    (arguments.output / "instructions.json").write_text(about + "\n", encoding="utf-8")
-    (arguments.output / "instructions.md").write_text(
-        f"{text}\n\n`python benchmarks/instructions.py`\n", encoding="utf-8"
-    )
-    print(text)
-
-
-if __name__ == "__main__":
-    main()
+    text = study.table(rows, COLUMNS)
+    study.write(asked.output, "instructions", text, rows, flags=compiled.flags)

@@ -1,8 +1,8 @@
 """Iterations of the preconditioned solvers on rigid chains of every kind, from a cold start.
 
-    python benchmarks/iterations.py [-o benchmarks/results] [--sizes 64 256 4096]
+    python -m benchmarks iterations [--sizes 64 256 4096] [-o DIR]
 
-Writes iterations.json and iterations.md. Each cell: iterations until the estimated A-norm error is
+Each cell: iterations until the estimated A-norm error is
 1e-10 of the solution, and the true error against the direct solution with refinement. Chains are
 equal rods of length 1, mass 1, radius 0.05 on a fixed base; "bent" is by random angles of up to
 1 rad; rates, torques and wrenches, hence the right-hand side, are random. Two aims are checked and
@@ -13,15 +13,14 @@ rs_conjugate_gradient at most 0.55 times the iterations of conjugate_gradient, u
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 import linkwise as lw
+from benchmarks import study
 
 TOLERANCE = 1e-10
 SOLVERS = (
@@ -31,7 +30,7 @@ SOLVERS = (
     "block_schwarz_conjugate_gradient",
     "two_level",
 )
-KINDS = {
+KINDS: dict[str, dict[str, Any]] = {
     "spherical": {"joint": "spherical"},
     "parallel hinges": {"joint": "revolute", "axes": "parallel"},
     "alternating hinges": {"joint": "revolute", "axes": "alternating"},
@@ -60,13 +59,13 @@ def system(kind: str, pose: str, n: int, seed: int) -> lw.ConstraintSystem:
     return lw.ConstraintSystem(model, q, v, tau, external=wrenches)
 
 
-def measure(kind: str, pose: str, n: int, seed: int) -> dict:
+def measure(kind: str, pose: str, n: int, seed: int) -> dict[str, Any]:
     made = system(kind, pose, n, seed)
     exact, _ = made.solve("thomas", solver_options={"refinement_steps": 4})
     scale = made.energy_norm(exact)
     most = MOST_ITERATIONS.get(n, MOST_ON_LONG_CHAINS)
     spectrum = made.spectrum()
-    row = {
+    row: dict[str, Any] = {
         "kind": kind,
         "pose": pose,
         "bodies": n,
@@ -87,32 +86,31 @@ def measure(kind: str, pose: str, n: int, seed: int) -> dict:
     return row
 
 
-def cell(found: dict) -> str:
+def cell(found: dict[str, Any]) -> str:
     if found["outcome"] == "reached_max_iterations":
         return f"> {found['iterations']}"
     text = f"{found['iterations']} ({found['error']:.0e})"
     return text if found["outcome"] == "converged" else f"{text}, {found['outcome']}"
 
 
-def markdown(rows: list[dict]) -> str:
-    lines = [
-        "# Iterations by kind of chain",
-        "",
-        "`python benchmarks/iterations.py`: iterations to an estimated A-norm error of 1e-10 of",
-        "the solution and, in brackets, the true one; cold start, rigid rods, random right-hand",
-        "side. Conditions marked > are lower bounds.",
-        "",
-        "| chain | N | condition | " + " | ".join(f"`{s}`" for s in SOLVERS) + " |",
-        "|---" * (3 + len(SOLVERS)) + "|",
-    ]
-    for row in rows:
-        condition = ("> " if row["condition_is_bound"] else "") + f"{row['condition']:.1e}"
-        cells = " | ".join(cell(row["solvers"][solver]) for solver in SOLVERS)
-        lines.append(f"| {row['kind']}, {row['pose']} | {row['bodies']} | {condition} | {cells} |")
-    return "\n".join(lines) + "\n"
+def condition(row: dict[str, Any]) -> str:
+    return ("> " if row["condition_is_bound"] else "") + f"{row['condition']:.1e}"
 
 
-def aims(rows: list[dict]) -> list[str]:
+COLUMNS: dict[str, Any] = {
+    "chain": lambda r: f"{r['kind']}, {r['pose']}",
+    "N": lambda r: r["bodies"],
+    "condition": condition,
+    **{f"`{s}`": lambda r, s=s: cell(r["solvers"][s]) for s in SOLVERS},
+}
+HEAD = """# Iterations by kind of chain
+
+Iterations to an estimated A-norm error of 1e-10 of the solution and, in brackets, the true one;
+cold start, rigid rods, random right-hand side. Conditions marked > are lower bounds.
+"""
+
+
+def aims(rows: list[dict[str, Any]]) -> list[str]:
     two_level = [r for r in rows if r["bodies"] in AIM_SIZES]
     worst = max((r["solvers"]["two_level"]["iterations"] for r in two_level), default=0)
     ratios = [
@@ -130,8 +128,7 @@ def aims(rows: list[dict]) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "results")
+    parser = study.parser(__doc__)
     parser.add_argument("--sizes", type=int, nargs="+", default=[64, 256, 4096])
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
@@ -141,15 +138,7 @@ def main() -> None:
             for pose in POSES:
                 rows.append(measure(kind, pose, n, asked.seed))
                 found = {s: cell(r) for s, r in rows[-1]["solvers"].items()}
-                print(f"N = {n}, {kind}, {pose}: {found}", flush=True)
-    found = aims(rows)
-    print(*found, sep="\n")
-    asked.output.mkdir(parents=True, exist_ok=True)
-    data = {"tolerance": TOLERANCE, "seed": asked.seed, "rows": rows, "aims": found}
-    (asked.output / "iterations.json").write_text(json.dumps(data, indent=1) + "\n")
-    text = markdown(rows) + "\n" + "\n".join(f"- {line}" for line in found) + "\n"
-    (asked.output / "iterations.md").write_text(text)
-
-
-if __name__ == "__main__":
-    main()
+                study.say(f"N = {n}, {kind}, {pose}: {found}")
+    table = study.table(rows, COLUMNS, left=len(COLUMNS))
+    text = "\n".join([HEAD, table, "", *(f"- {line}" for line in aims(rows))])
+    study.write(asked.output, "iterations", text, rows, tolerance=TOLERANCE, seed=asked.seed)

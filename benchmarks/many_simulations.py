@@ -1,8 +1,8 @@
 """Many simulations of one arm at once, beside one by one and beside MuJoCo's rollouts.
 
-    python benchmarks/many_simulations.py [-o benchmarks/results] [--members 1024]
+    python -m benchmarks many_simulations [--members 1024] [-o DIR]
 
-The chain of seven joints of `linkwise bench` moves for a second from as many states, by steps of
+The chain of seven joints of `peers` moves for a second from as many states, by steps of
 1 ms of the classical Runge-Kutta method; end positions are compared before anything is timed. Time
 is that of the processor, all threads together, the best of five. MuJoCo (`mujoco.rollout`, no
 contacts, constraints and sensors) takes part where it is installed; it finds no joint loads, and
@@ -11,56 +11,53 @@ records every step as its interface has it. Writes many_simulations.json and man
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
-import json
 import tempfile
-import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import linkwise as lw
-from linkwise import _core
-from linkwise.bench.machine import random_chain, random_states, read_bodies, write_machine
-from linkwise.record.provenance import versions
+from benchmarks import study
+from benchmarks.machine import Array, random_chain, random_states, read_bodies, write_machine
 
 STEP, STEPS, JOINTS = 1e-3, 1000, 7
 EVALUATIONS = 4  # a step
 SLOW = 32  # members that are simulated one by one: more would only take longer
 
 
-def mujoco_rollouts(machine: Any, q: np.ndarray, v: np.ndarray) -> Callable[[int], np.ndarray]:
+def mujoco_rollouts(machine: Any, q: Array, v: Array) -> Callable[[int], Array]:
     import mujoco
     import mujoco.rollout
 
-    from linkwise.bench.engines.mujoco import _model
+    from benchmarks.engines.mujoco import compiled_model
 
     with tempfile.TemporaryDirectory() as folder:
         write_machine(machine, Path(folder))
         gravity, bodies = read_bodies(Path(folder))
-    model = _model(mujoco, gravity, bodies)
+    model = compiled_model(mujoco, gravity, bodies)
     model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, STEP
     states = np.hstack([np.zeros((len(q), 1)), q, v])
     data = mujoco.MjData(model)
 
-    def run(count: int) -> np.ndarray:
+    def run(count: int) -> Array:
         found, _ = mujoco.rollout.rollout(model, data, states[:count], nstep=STEPS)
         return np.asarray(found)[:, -1, 1 : 1 + JOINTS]
 
     return run
 
 
-def contestants(members: int) -> dict[str, tuple[int, Callable[[int], np.ndarray]]]:
+def contestants(members: int) -> dict[str, tuple[int, Callable[[int], Array]]]:
     """Name: how many members it simulates, and how."""
     machine = random_chain(JOINTS)
     drawn = random_states(machine, members)
     model, q, v = machine.model, drawn.q, drawn.v
     end = STEP * STEPS
 
-    def at_once(count: int, *quantities: str) -> np.ndarray:
+    def at_once(count: int, *quantities: str) -> Array:
         batch = lw.simulate_batch(
             model,
             q0=q[:count],
@@ -70,10 +67,9 @@ def contestants(members: int) -> dict[str, tuple[int, Callable[[int], np.ndarray
             threads=1,
             quantities=("position", *quantities),
         )
-        found: np.ndarray = batch.position.values[:, 0]
-        return found
+        return np.asarray(batch.position.values[:, 0])
 
-    def one_by_one(count: int) -> np.ndarray:
+    def one_by_one(count: int) -> Array:
         ends = []
         for k in range(count):
             run = lw.simulate(
@@ -108,12 +104,7 @@ def measure(members: int) -> list[dict[str, Any]]:
         error = float(np.abs(ends - expected[:count]).max())
         if error > 1e-6:
             raise SystemExit(f"{name} ends {error:.1e} rad away from simulate_batch")
-        seconds = []
-        for _ in range(5):
-            started = time.process_time()
-            run(count)
-            seconds.append(time.process_time() - started)
-        each = min(seconds) / count
+        each = study.least_processor_time(partial(run, count)) / count
         rows.append(
             {
                 "what": name,
@@ -129,35 +120,18 @@ def measure(members: int) -> list[dict[str, Any]]:
     return rows
 
 
-def markdown(rows: list[dict[str, Any]]) -> str:
-    lines = [
-        "| one core | ms a member | ns a body and evaluation | times real time | ratio |",
-        "|---|---:|---:|---:|---:|",
-    ]
-    lines += [
-        f"| {row['what']} | {row['ms_a_member']:.3g} | {row['ns_a_body_and_evaluation']:.3g} "
-        f"| {row['times_real_time']:,.0f} | {row['ratio']:.2g} |"
-        for row in rows
-    ]
-    return "\n".join(lines)
+COLUMNS: study.Columns = {
+    "one core": lambda r: r["what"],
+    "ms a member": lambda r: f"{r['ms_a_member']:.3g}",
+    "ns a body and evaluation": lambda r: f"{r['ns_a_body_and_evaluation']:.3g}",
+    "times real time": lambda r: f"{r['times_real_time']:,.0f}",
+    "ratio": lambda r: f"{r['ratio']:.2g}",
+}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "results")
+    parser = study.parser(__doc__)
     parser.add_argument("--members", type=int, default=1024)
-    arguments = parser.parse_args()
-    rows = measure(arguments.members)
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    about = {"versions": versions(), "cpu_target": _core.cpu_target, "rows": rows}
-    text = markdown(rows)
-    for name, content in {
-        "many_simulations.json": json.dumps(about, indent=1) + "\n",
-        "many_simulations.md": f"{text}\n\n`python benchmarks/many_simulations.py`\n",
-    }.items():
-        (arguments.output / name).write_text(content, encoding="utf-8")
-    print(text)
-
-
-if __name__ == "__main__":
-    main()
+    asked = parser.parse_args()
+    rows = measure(asked.members)
+    study.write(asked.output, "many_simulations", study.table(rows, COLUMNS), rows)

@@ -1,6 +1,6 @@
 """One forward dynamics of a chain of a million links: time and memory a link, by method.
 
-    python benchmarks/million_links.py [--links N]
+    python -m benchmarks million_links [--links N] [-o DIR]
 
 A chain of rods, hinges about x and y in turn, bent a little everywhere. Each method runs in a
 process of its own, so that the memory is its own: that of the model, and that of the process at
@@ -11,15 +11,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import resource
-import subprocess
-import sys
 import time
 from typing import Any
 
 import numpy as np
 
 import linkwise as lw
+from benchmarks import study
 
 METHODS: dict[str, dict[str, Any]] = {
     "auto": {},
@@ -31,14 +29,10 @@ SEED, BEND = 1993, 0.01
 AGREEMENT = 1e-9
 
 
-def used() -> int:
-    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-
-
 def evaluate(name: str, n: int) -> dict[str, Any]:
-    empty, started = used(), time.perf_counter()
+    empty, started = study.peak_bytes(), time.perf_counter()
     model = lw.scenes.chain(n, gravity=(0, 0, 0))
-    built, with_model = time.perf_counter() - started, used()
+    built, with_model = time.perf_counter() - started, study.peak_bytes()
     rng = np.random.default_rng(SEED)
     q, tau = BEND * rng.standard_normal(model.nq), rng.standard_normal(model.nv)
     started = time.perf_counter()
@@ -51,35 +45,37 @@ def evaluate(name: str, n: int) -> dict[str, Any]:
         "build_seconds": built,
         "seconds": seconds,
         "model_bytes": (with_model - empty) / n,
-        "bytes": (used() - empty) / n,
+        "bytes": (study.peak_bytes() - empty) / n,
         "accelerations": found.acceleration[:: max(1, n // 1000)].tolist(),
     }
 
 
+COLUMNS: study.Columns = {
+    "method": lambda r: r["method"],
+    "model built in": lambda r: f"{r['build_seconds']:.1f} s",
+    "evaluated in": lambda r: f"{r['seconds']:.2f} s",
+    "bytes a link, model": lambda r: f"{r['model_bytes']:.0f}",
+    "in all": lambda r: f"{r['bytes']:.0f}",
+    "deviation": lambda r: f"{r['deviation']:.0e}",
+}
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = study.parser(__doc__)
     parser.add_argument("--links", type=int, default=1_000_000)
     parser.add_argument("--method", choices=METHODS, help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
-    if arguments.method:
-        print(json.dumps(evaluate(arguments.method, arguments.links)))
+    asked = parser.parse_args()
+    if asked.method:
+        print(json.dumps(evaluate(asked.method, asked.links)))
         return
-    rows = []
-    for name in METHODS:
-        command = [sys.executable, __file__, "--links", str(arguments.links), "--method", name]
-        rows.append(json.loads(subprocess.check_output(command, text=True)))
+    rows = [
+        study.in_own_process("million_links", "--links", asked.links, "--method", name)
+        for name in METHODS
+    ]
     expected = np.array(rows[0]["accelerations"])
-    print("| method | model built in | evaluated in | bytes a link, model | in all | deviation |")
-    print("|---|---:|---:|---:|---:|---:|")
     for row in rows:
-        off = float(np.abs(row["accelerations"] - expected).max() / np.abs(expected).max())
-        print(
-            f"| {row['method']} | {row['build_seconds']:.1f} s | {row['seconds']:.2f} s | "
-            f"{row['model_bytes']:.0f} | {row['bytes']:.0f} | {off:.0e} |"
-        )
-        if off > AGREEMENT:
+        found = np.array(row.pop("accelerations"))
+        row["deviation"] = float(np.abs(found - expected).max() / np.abs(expected).max())
+        if row["deviation"] > AGREEMENT:
             raise SystemExit(f"{row['method']} differs from {rows[0]['method']}")
-
-
-if __name__ == "__main__":
-    main()
+    study.write(asked.output, "million_links", study.table(rows, COLUMNS), rows)

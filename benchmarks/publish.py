@@ -1,12 +1,12 @@
 """Measures this machine and puts the tables where they are read.
 
-    python benchmarks/publish.py NAME [--no-run]
+    python -m benchmarks publish NAME [--no-run]
 
-Writes benchmarks/results/NAME (bench.json, bench.md, figures) by `linkwise bench`, and there too
-what instructions.py, many_simulations.py and huge_chains.py beside this file find; then replaces
-the text between the marks <!-- bench-table --> in README.md and <!-- bench-targets -->,
-<!-- many-simulations --> and <!-- huge-chains --> in docs/benchmarking.md. With --no-run it takes
-the results that are there.
+Writes benchmarks/results/NAME by the studies `peers`, `instructions`, `many_simulations` and
+`huge_chains`; then replaces the text between the marks <!-- bench-table --> in README.md and
+<!-- bench-targets -->, <!-- many-simulations --> and <!-- huge-chains --> in docs/benchmarking.md.
+With --no-run it takes the results that are there: bench.json stays on the machine that wrote it,
+the repository keeps the tables.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from linkwise.bench.report import short_table, target_table
-from linkwise.bench.run import Result, read, run_bench, write
+from benchmarks.peers import Result, read, run_bench, write
+from benchmarks.report import short_table, target_table
+from benchmarks.study import RESULTS, ROOT, say
 
-ROOT = Path(__file__).resolve().parents[1]
-#: Scripts beside this one that write NAME.md into a folder; the first has no table of its own in
+#: Studies that write NAME.md into a folder; the first has no table of its own in
 #: the documents.
 OTHERS = ("instructions", "many_simulations", "huge_chains")
 
@@ -51,29 +51,26 @@ def put(path: Path, mark: str, new: str) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Measures this machine, puts the tables.")
     parser.add_argument("name", help="of the machine: benchmarks/results/NAME")
     parser.add_argument("--no-run", action="store_true", help="take the results that are there")
     arguments = parser.parse_args()
-    folder = ROOT / "benchmarks" / "results" / arguments.name
+    folder = RESULTS / arguments.name
     if not arguments.no_run:
-        say = lambda message: print(message, file=sys.stderr)  # noqa: E731
-        write(run_bench(sources=ROOT, say=say), folder)
+        write(run_bench(), folder)
         for name in OTHERS:
-            say(f"{name}.py")
-            script = ROOT / "benchmarks" / f"{name}.py"
-            subprocess.run([sys.executable, script, "-o", folder], check=True)
+            say(name)
+            command = [sys.executable, "-m", "benchmarks", name, "-o", str(folder)]
+            subprocess.run(command, check=True, cwd=ROOT)
+    if not (folder / "bench.json").is_file():
+        raise SystemExit(f"{folder / 'bench.json'} is not here: run without --no-run")
     result = read(folder / "bench.json")
     table = short_table(result.rows)
     line = conditions_line(result, arguments.name, "benchmarks/results")
     put(ROOT / "README.md", "bench-table", f"{table}\n\n{line}")
     line = conditions_line(result, arguments.name, "../benchmarks/results")
-    performance = ROOT / "docs" / "benchmarking.md"
-    put(performance, "bench-targets", f"{target_table(result.targets)}\n\n{line}")
+    page = ROOT / "docs" / "benchmarking.md"
+    put(page, "bench-targets", f"{target_table(result.targets)}\n\n{line}")
     for name in OTHERS[1:]:
         text = (folder / f"{name}.md").read_text(encoding="utf-8")
-        put(performance, name.replace("_", "-"), text.rpartition("`python")[0])
-
-
-if __name__ == "__main__":
-    main()
+        put(page, name.replace("_", "-"), text.rpartition("`python")[0])

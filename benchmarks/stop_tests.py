@@ -1,20 +1,19 @@
 """What each stop test leaves: true error against the direct solution, cold start, rigid chains.
 
-    python benchmarks/stop_tests.py [-o benchmarks/results]
+    python -m benchmarks stop_tests [-o DIR]
 
-Writes stop_tests.md. Each cell: the true relative error of the constraint forces in the A-norm, and
+Each cell: the true relative error of the constraint forces in the A-norm, and
 the iterations, at a tolerance of 1e-7. Chains and loads as in iterations.py; the direct solution is
 refined.
 """
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
-from iterations import system
+from typing import Any
 
 import linkwise as lw
+from benchmarks import study
+from benchmarks.iterations import system
 
 TOLERANCE = 1e-7
 MOST_ITERATIONS = 50_000
@@ -36,7 +35,15 @@ SOLVERS = (
 )
 
 
-def cell(made: lw.ConstraintSystem, exact, solver: str, stop: str) -> str:
+HEAD = f"""# What a tolerance of 1e-7 leaves
+
+True relative error in the A-norm (iterations), cold start. Counts marked > reached the limit of
+{MOST_ITERATIONS}.
+
+"""
+
+
+def cell(made: lw.ConstraintSystem, exact: Any, solver: str, stop: str) -> str:
     f, report = made.solve(solver, tolerance=TOLERANCE, stop=stop, max_iterations=MOST_ITERATIONS)
     error = made.energy_norm(f - exact) / made.energy_norm(exact)
     count = f"> {report.iterations}" if report.outcome != "converged" else str(report.iterations)
@@ -44,30 +51,19 @@ def cell(made: lw.ConstraintSystem, exact, solver: str, stop: str) -> str:
 
 
 def main() -> None:
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "results")
-    arguments.add_argument("--seed", type=int, default=0)
-    asked = arguments.parse_args()
+    parser = study.parser(__doc__)
+    parser.add_argument("--seed", type=int, default=0)
+    asked = parser.parse_args()
     rules = [rule["name"] for rule in lw.stop_rules()]
-    lines = [
-        "# What a tolerance of 1e-7 leaves",
-        "",
-        "`python benchmarks/stop_tests.py`: true relative error in the A-norm (iterations), cold",
-        f"start. Counts marked > reached the limit of {MOST_ITERATIONS}.",
-        "",
-        "| rigid chain | solver | " + " | ".join(f"`{rule}`" for rule in rules) + " |",
-        "|---" * (2 + len(rules)) + "|",
-    ]
+    rows: list[dict[str, str]] = []
     for kind, pose, n in CHAINS:
         made = system(kind, pose, n, asked.seed)
         exact, _ = made.solve("thomas", solver_options={"refinement_steps": 4})
         for solver in SOLVERS:
-            found = " | ".join(cell(made, exact, solver, rule) for rule in rules)
-            lines.append(f"| {kind}, {pose}, N = {n} | `{solver}` | {found} |")
-            print(lines[-1], flush=True)
-    asked.output.mkdir(parents=True, exist_ok=True)
-    (asked.output / "stop_tests.md").write_text("\n".join(lines) + "\n")
-
-
-if __name__ == "__main__":
-    main()
+            row = {"rigid chain": f"{kind}, {pose}, N = {n}", "solver": f"`{solver}`"}
+            row |= {f"`{rule}`": cell(made, exact, solver, rule) for rule in rules}
+            rows.append(row)
+            study.say(" ".join(row.values()))
+    columns: dict[str, Any] = {name: lambda r, name=name: r[name] for name in rows[0]}
+    text = HEAD + study.table(rows, columns, left=len(columns))
+    study.write(asked.output, "stop_tests", text, rows)

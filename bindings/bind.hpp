@@ -11,5 +11,6 @@ void bind_kinematics(nanobind::module_& m);
 void bind_simulation(nanobind::module_& m);
 void bind_batch_simulation(nanobind::module_& m);
 void bind_solve(nanobind::module_& m);
+void bind_paper(nanobind::module_& m);
 
 }  // namespace linkwise::bindings

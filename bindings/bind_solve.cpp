@@ -9,7 +9,6 @@
 #include "bind.hpp"
 #include "interrupt.hpp"
 #include "linkwise/constraint/tree_system.hpp"
-#include "linkwise/dynamics/serial_part.hpp"
 #include "linkwise/forces/passive.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "linkwise/solve/spectrum.hpp"
@@ -462,22 +461,6 @@ void bind_solve(nb::module_& m) {
   m.def("stop_rules", &stop_rule_list, "The stop rules of iterative solvers, as dictionaries.");
   m.def("solver_options", &solver_option_list,
         "The keys of solver_options={...}, as dictionaries of name, default and description.");
-  m.def(
-      "measure_serial_part",
-      [](const PyModel& self, nb::handle q, nb::handle v, int sums, int repeats) {
-        const StateRows rows(*self.model, q, v, nb::none(), nb::none(), false, 0);
-        if (sums < 0 || repeats < 1) throw InputError("sums must be >= 0 and repeats >= 1");
-        const SerialPart part =
-            measure_serial_part(*self.model, rows.input(*self.model, 0), sums, repeats);
-        nb::dict out;
-        out["sums"] = part.sums;
-        out["velocities"] = part.velocities;
-        return out;
-      },
-      "model"_a, "q"_a, "v"_a = nb::none(), nb::kw_only(), "sums"_a, "repeats"_a = 1000,
-      "Seconds of what no number of processors shortens in an evaluation by constraint forces: "
-      "adding one number a body\n"
-      "`sums` times, and passing the velocities from body to body.");
 }
 
 }  // namespace linkwise::bindings

@@ -23,6 +23,7 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
   linkwise::bindings::bind_simulation(m);
   linkwise::bindings::bind_batch_simulation(m);
   linkwise::bindings::bind_solve(m);
+  linkwise::bindings::bind_paper(m);
 
   m.attr("__name__") = module_name;
 }

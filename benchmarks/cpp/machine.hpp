@@ -1,5 +1,5 @@
 #pragma once
-// What every contestant reads: a case folder, written by `linkwise bench`.
+// What every contestant reads: a case folder, written by benchmarks/peers.py.
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-// Times the methods of one engine, on request, without Python in the process. `linkwise bench`
+// Times the methods of one engine, on request, without Python in the process. benchmarks/peers.py
 // starts one worker an engine, lets them take turns, and talks to each over its standard streams:
 //     clear              -> {}, and the last machine is gone
 //     build FOLDER       -> {"states": ..., "contestants": [...]}

@@ -8,7 +8,6 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from linkwise.cli.bench import bench
 from linkwise.cli.compare import compare
 from linkwise.cli.demo import demo
 from linkwise.cli.inspect import inspect
@@ -28,7 +27,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command()(bench)
 app.command()(compare)
 app.command()(demo)
 app.command()(inspect)

@@ -36,7 +36,7 @@ def joint_axes(axes: str | ArrayLike, n: int, seed: int) -> np.ndarray:
     raise InputError(f"axes {axes!r} is unknown; known: {', '.join(_PATTERNS)}, or an array (k, 3)")
 
 
-#: Of a model and one evaluation of it; `linkwise bench --cases memory` measures it.
+#: Of a model and one evaluation of it; `python -m benchmarks peers --cases memory` measures it.
 BYTES_PER_BODY = 1800
 
 

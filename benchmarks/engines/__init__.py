@@ -1,0 +1,1 @@
+"""The engines, one file each; what a file offers is in `benchmarks.engines.table`."""

@@ -1,0 +1,71 @@
+"""What the studies share: their arguments, processes of their own, tables, files."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from linkwise import _core
+from linkwise.record.provenance import versions
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks" / "results"
+Columns = Mapping[str, Callable[[Any], object]]
+
+
+def parser(description: str | None) -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser(description=(description or "").splitlines()[0])
+    made.add_argument("-o", "--output", type=Path, default=RESULTS, help="folder for the results")
+    return made
+
+
+def say(message: str) -> None:
+    print(message, file=sys.stderr)
+
+
+def in_own_process(study: str, *arguments: object) -> Any:
+    """What `python -m benchmarks STUDY ARGUMENTS` prints as JSON: its memory is its own."""
+    command = [sys.executable, "-m", "benchmarks", study, *map(str, arguments)]
+    return json.loads(subprocess.check_output(command, text=True, cwd=ROOT))
+
+
+def peak_bytes() -> int:
+    """The most that this process has held."""
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def least_processor_time(call: Callable[[], object], turns: int = 5) -> float:
+    """Seconds of all threads together, of the best turn: a busy machine hardly matters."""
+    spent = []
+    for _ in range(turns):
+        started = time.process_time()
+        call()
+        spent.append(time.process_time() - started)
+    return min(spent)
+
+
+def table(rows: Sequence[Any], columns: Columns, *, left: int = 1) -> str:
+    """Markdown; the first `left` columns are text, the others numbers."""
+    lines = [
+        f"| {' | '.join(columns)} |",
+        "|" + "---|" * left + "---:|" * (len(columns) - left),
+    ]
+    lines += [f"| {' | '.join(str(show(row)) for show in columns.values())} |" for row in rows]
+    return "\n".join(lines)
+
+
+def write(folder: Path, study: str, text: str, rows: object, **about: Any) -> None:
+    """STUDY.md, which the repository keeps, and STUDY.json with all digits, which it does not."""
+    folder.mkdir(parents=True, exist_ok=True)
+    about = {"versions": versions(), "cpu_target": _core.cpu_target, **about, "rows": rows}
+    (folder / f"{study}.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
+    command = f"`python -m benchmarks {study}`"
+    (folder / f"{study}.md").write_text(f"{text}\n\n{command}\n", encoding="utf-8")
+    print(text)

@@ -1,6 +1,0 @@
-"""`linkwise bench`: this package's speed beside that of every other engine that is installed.
-
-Every engine runs in a worker process of its own, with bounded memory and time, so that one that
-fails says why and takes nothing else with it. Workers take turns within one run: what disturbs the
-machine disturbs all of them.
-"""
