@@ -74,7 +74,7 @@ SHOWN: study.Columns = {
     "simulated in": lambda r: f"{r['seconds']:.1f} s",
     "processor time, labels of the results included": lambda r: f"{r['processor_seconds']:.0f} s",
     "peak memory": lambda r: f"{r['peak_bytes'] / 2**30:.2f} GiB",
-    "bytes a link": lambda r: f"{r['peak_bytes_per_link']:.0f}",
+    "bytes per link": lambda r: f"{r['peak_bytes_per_link']:.0f}",
     "tip fell": lambda r: f"{r['tip_fell']:.9g} m of {r['free_fall']:.9g} m",
     "energy drift": lambda r: f"{r['energy_drift']:.1e} of the kinetic energy",
 }

@@ -82,9 +82,9 @@ def measure(program: Path, engine: str, folder: Path, offer: dict[str, Any], n: 
 COLUMNS: study.Columns = {
     "": lambda r: f"{r['engine']} {r['method']}{', loads' if r['loads'] else ''}",
     "bodies": lambda r: r["n_bodies"],
-    "instructions a body": lambda r: f"{r['instructions_per_body']:.0f}",
-    "ns a body": lambda r: f"{r['ns_per_body']:.0f}",
-    "instructions a ns": lambda r: f"{r['instructions_per_ns']:.1f}",
+    "instructions per body": lambda r: f"{r['instructions_per_body']:.0f}",
+    "ns per body": lambda r: f"{r['ns_per_body']:.0f}",
+    "instructions per ns": lambda r: f"{r['instructions_per_ns']:.1f}",
 }
 
 

@@ -122,8 +122,8 @@ def measure(members: int) -> list[dict[str, Any]]:
 
 COLUMNS: study.Columns = {
     "one core": lambda r: r["what"],
-    "ms a member": lambda r: f"{r['ms_a_member']:.3g}",
-    "ns a body and evaluation": lambda r: f"{r['ns_a_body_and_evaluation']:.3g}",
+    "ms per member": lambda r: f"{r['ms_a_member']:.3g}",
+    "ns per body and evaluation": lambda r: f"{r['ns_a_body_and_evaluation']:.3g}",
     "times real time": lambda r: f"{r['times_real_time']:,.0f}",
     "ratio": lambda r: f"{r['ratio']:.2g}",
 }

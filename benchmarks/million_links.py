@@ -54,7 +54,7 @@ COLUMNS: study.Columns = {
     "method": lambda r: r["method"],
     "model built in": lambda r: f"{r['build_seconds']:.1f} s",
     "evaluated in": lambda r: f"{r['seconds']:.2f} s",
-    "bytes a link, model": lambda r: f"{r['model_bytes']:.0f}",
+    "bytes per link, model": lambda r: f"{r['model_bytes']:.0f}",
     "in all": lambda r: f"{r['bytes']:.0f}",
     "deviation": lambda r: f"{r['deviation']:.0e}",
 }

@@ -78,7 +78,7 @@ def _by_size(pyplot: Any, rows: Sequence[Row]) -> Any:
             **_style(engine, seen[engine]),
         )
     axes.set_xlabel("bodies")
-    axes.set_ylabel("ns a body")
+    axes.set_ylabel("ns per body")
     return _finish(figure, axes, "One forward-dynamics evaluation")
 
 
@@ -98,8 +98,8 @@ def _bars(pyplot: Any, rows: Sequence[Row]) -> Any:
         )
     axes.set_yscale("log")
     axes.set_xticks(range(len(machines)), machines)
-    axes.set_ylabel("ns a body")
-    return _finish(figure, axes, "One forward-dynamics evaluation a state")
+    axes.set_ylabel("ns per body")
+    return _finish(figure, axes, "One forward-dynamics evaluation per state")
 
 
 def _work_precision(pyplot: Any, rows: Sequence[Row]) -> Any:

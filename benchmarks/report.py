@@ -66,7 +66,7 @@ def by_machine(rows: Sequence[Row]) -> str:
         [label, *(cell(cells[where, label].get(machine)) for machine in machines)]
         for where, label in ordered
     ]
-    return table(["ns a body", *machines], lines)
+    return table(["ns per body", *machines], lines)
 
 
 def failures(rows: Sequence[Row]) -> str:
@@ -95,7 +95,7 @@ def _memory(rows: Sequence[Row]) -> str:
         for row in rows
         if row.method
     ]
-    return table(["bodies", "", "ns a body", "bytes a body", "built in s"], lines)
+    return table(["bodies", "", "ns per body", "bytes per body", "built in s"], lines)
 
 
 def _threads(rows: Sequence[Row]) -> str:
@@ -111,7 +111,7 @@ def _threads(rows: Sequence[Row]) -> str:
         for row in rows
         if row.method
     ]
-    return table(["machine", "", "ns a body", "speed", "bits"], lines)
+    return table(["machine", "", "ns per body", "speed", "bits"], lines)
 
 
 def _simulation(rows: Sequence[Row]) -> str:
@@ -217,7 +217,7 @@ def short_table(rows: Sequence[Row]) -> str:
         elif mine:
             python = "" if any(r.arena == CPP for r in mine) else ", from Python"
             lines.append([f"{name}{python}", *_cells(mine, machines)])
-    return table(["ns a body", *machines], lines)
+    return table(["ns per body", *machines], lines)
 
 
 def _cells(rows: Sequence[Row], machines: Sequence[str]) -> list[str]:

@@ -29,7 +29,7 @@ class Row:
     against_pinocchio: float | None = None  # Pinocchio's better convention's time to this row's
     failure: str = ""
     figures: dict[str, Any] = field(default_factory=dict)  # what only this case has
-    samples: list[float] = field(default_factory=list)  # ns a body of every turn
+    samples: list[float] = field(default_factory=list)  # ns per body of every turn
 
     @property
     def measured(self) -> bool:

@@ -69,7 +69,7 @@ def _single(rows: Sequence[Row]) -> list[Target]:
         mine = _one(rows, case="single", arena=CPP, n_bodies=n, engine="linkwise")
         made.append(
             Target(
-                f"one chain of {n}, one core, ns a body against Pinocchio's at 300",
+                f"one chain of {n}, one core, ns per body against Pinocchio's at 300",
                 aim,
                 "times",
                 _quotient(peer, mine),
@@ -130,13 +130,13 @@ def _memory(rows: Sequence[Row]) -> list[Target]:
         held = row.figures.get("bytes_per_body") if row else None
         made += [
             Target(
-                f"a chain of {n:,}, ns a body",
+                f"a chain of {n:,}, ns per body",
                 1.3,
                 "times those at 1,000",
                 _quotient(row, short),
                 at_least=False,
             ),
-            Target(f"a chain of {n:,}, memory", 2000.0, "bytes a body", held, at_least=False),
+            Target(f"a chain of {n:,}, memory", 2000.0, "bytes per body", held, at_least=False),
         ]
     return made
 

@@ -62,7 +62,7 @@ Model machine(const std::vector<int>& parents, bool floating_base) {
   return Model(spec);
 }
 
-/// evaluate(input, du, loads), ns a body.
+/// evaluate(input, du, loads), ns per body.
 template <class Evaluate>
 double nanoseconds(const Model& model, Evaluate&& evaluate) {
   const size_t nq = model.nq(), nv = model.nv();
@@ -137,7 +137,7 @@ void print_tree(const char* name, const std::vector<int>& parents, bool floating
 }  // namespace
 
 int main() {
-  std::printf("%d lanes, ns a body\n\n| chain of | body by body | piecewise | auto |\n",
+  std::printf("%d lanes, ns per body\n\n| chain of | body by body | piecewise | auto |\n",
               native_lanes);
   std::printf("|---:|---:|---:|---|\n");
   for (const int n : {16, 32, 48, 64, 96, 128, 300, 1000}) print_chain(n);

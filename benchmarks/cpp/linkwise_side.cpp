@@ -18,7 +18,7 @@ namespace {
 /// O(N^3) time and O(N^2) memory: beyond this it only costs time to show that it loses.
 constexpr int largest_for_mass_matrix = 300;
 /// One conjugate-gradient iteration costs a quarter of a direct solve, and random chains take about
-/// six iterations a body.
+/// six iterations per body.
 constexpr int largest_for_iterations = 30;
 constexpr double iterative_tolerance = 1e-12;
 

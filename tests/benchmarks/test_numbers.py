@@ -149,7 +149,7 @@ def test_targets_compare_what_they_say():
     check("one system, one core, N = 30, constraint_force", 2.5, True)
     check("one chain of 300", 5.0, False)  # the best of ours, "pieces", against Pinocchio's at 300
     check("one chain of 1,000", 60.0, True)
-    check("a chain of 100,000, ns a body", 1.2, True)
+    check("a chain of 100,000, ns per body", 1.2, True)
     check("a chain of 100,000, memory", 2100.0, False)
     check("two threads on one chain of 1,000", 1.9, True)
     check("accelerations, loads and a report of a 7-joint arm from Python", 2.1, False)
