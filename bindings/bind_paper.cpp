@@ -31,6 +31,7 @@ nb::dict measure_serial_part(const PyModel& self, nb::handle q, nb::handle v, in
   const Model& model = *self.model;
   const Argument positions("q", {static_cast<size_t>(model.nq())}, q);
   const Argument rates("v", {static_cast<size_t>(model.nv())}, v);
+  if (!positions.given || !rates.given) throw InputError("q or v is missing; give both");
   SweepInput<double> in;
   in.q = positions.data;
   in.v = rates.data;
