@@ -47,7 +47,8 @@ def read_mjcf(
             builder.add_note(level, element, text)
         return builder.build(keep_fixed=keep_fixed)
     except InputError as error:
-        raise InputError(f"{shorten(os.fspath(path), 400)}: {error}") from None
+        text = str(error).replace(f" of {file_name(path)}", "", 1)
+        raise InputError(f"{shorten(os.fspath(path), 400)}: {text}") from None
 
 
 def compile_mjcf(path: str | os.PathLike[str]) -> Any:
