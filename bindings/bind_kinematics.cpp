@@ -31,11 +31,7 @@ nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handl
   return s.lead.empty() && tail.empty() ? nb::object(nb::float_(out.data[0])) : out.array;
 }
 
-}  // namespace
-
-void bind_kinematics(nb::module_& m) {
-  m.def("require_memory", &require_memory, "bytes"_a, "what"_a,
-        "MemoryError, with the estimate, where so many bytes are not available.");
+void bind_forces_and_energies(nb::module_& m) {
   m.def(
       "mass_matrix",
       [](const PyModel& self, nb::handle q, nb::handle threads) {
@@ -92,6 +88,28 @@ void bind_kinematics(nb::module_& m) {
       "model"_a, "q"_a, "v"_a, nb::kw_only(), "threads"_a = nb::none(),
       "Linear [kg m/s] and angular [kg m2/s] momentum (..., 6) about the world origin, world "
       "axes.");
+}
+
+/// The joint of a body given by the name of its link or by index.
+int joint_of(const PyModel& self, nb::handle body) {
+  int joint = -1;
+  if (nb::isinstance<nb::str>(body)) {
+    const LinkInfo& link = self.model->links[self.model->link_index(nb::cast<std::string>(body))];
+    joint = link.joint;
+    if (joint < 0 || self.model->links[self.model->joints[joint].link].name != link.name)
+      throw InputError("link '" + link.name +
+                       "' is welded and has no frame of its own; name the body that carries "
+                       "it (Model.notes)");
+  } else {
+    joint = nb::cast<int>(body);
+    if (joint < 0 || joint >= self.model->n_joints())
+      throw InputError("body index " + std::to_string(joint) + " is out of range; the model has " +
+                       std::to_string(self.model->n_joints()) + " bodies");
+  }
+  return joint;
+}
+
+void bind_poses(nb::module_& m) {
   m.def(
       "body_poses",
       [](const PyModel& self, nb::handle q, nb::handle threads) {
@@ -116,22 +134,7 @@ void bind_kinematics(nb::module_& m) {
   m.def(
       "body_jacobian",
       [](const PyModel& self, nb::handle q, nb::handle body, nb::handle threads) {
-        int joint = -1;
-        if (nb::isinstance<nb::str>(body)) {
-          const LinkInfo& link =
-              self.model->links[self.model->link_index(nb::cast<std::string>(body))];
-          joint = link.joint;
-          if (joint < 0 || self.model->links[self.model->joints[joint].link].name != link.name)
-            throw InputError("link '" + link.name +
-                             "' is welded and has no frame of its own; name the body that carries "
-                             "it (Model.notes)");
-        } else {
-          joint = nb::cast<int>(body);
-          if (joint < 0 || joint >= self.model->n_joints())
-            throw InputError("body index " + std::to_string(joint) +
-                             " is out of range; the model has " +
-                             std::to_string(self.model->n_joints()) + " bodies");
-        }
+        const int joint = joint_of(self, body);
         return map_states(self, q, nb::none(), threads, {6, size(self.model->nv())},
                           [joint](const Model& m, const double* q, const double*, double* out) {
                             body_jacobian(m, q, joint, out);
@@ -140,6 +143,15 @@ void bind_kinematics(nb::module_& m) {
       "model"_a, "q"_a, "body"_a, nb::kw_only(), "threads"_a = nb::none(),
       "Jacobian (..., 6, nv) of a body's frame in its own axes, linear first; body: name or "
       "index.");
+}
+
+}  // namespace
+
+void bind_kinematics(nb::module_& m) {
+  m.def("require_memory", &require_memory, "bytes"_a, "what"_a,
+        "MemoryError, with the estimate, where so many bytes are not available.");
+  bind_forces_and_energies(m);
+  bind_poses(m);
 }
 
 }  // namespace linkwise::bindings

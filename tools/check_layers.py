@@ -102,18 +102,12 @@ def check(root: Path) -> list[str]:
     return violations
 
 
-#: Files that still use each other, by the ends of their names.
-EXCEPT = ("plots", "result", "source")
-EXCEPT += ("causes", "energy", "samples", "shown_loads")
-
-
 def check_circles(root: Path) -> list[str]:
     graphs = {"includes": include_graph(root), "imports": import_graph(root)}
     return [
         f"{group[0]}: {what} go in a circle: {', '.join(group)}"
         for what, graph in graphs.items()
         for group in circles(graph)
-        if not all(name.endswith(EXCEPT) for name in group)
     ]
 
 

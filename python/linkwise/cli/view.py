@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from linkwise.cli.model import FloatingBase, PackageDirs
 from linkwise.cli.output import JsonOption, console, print_json, say
+
+if TYPE_CHECKING:
+    from linkwise.view.source import Source
 
 
 def view(
@@ -69,61 +73,74 @@ def view(
     as_json: JsonOption = False,
 ) -> None:
     """Show RUN or MODEL in 3-D in the browser: motion, and the load of every joint. Ctrl-C ends."""
-    from linkwise._core import InputError
-    from linkwise.view.export import check_file, write_html
-    from linkwise.view.live import show
-    from linkwise.view.server import check_address
     from linkwise.view.source import Options, open_source
+
+    _check(color, export, host, port)
+    options = Options(
+        model=model,
+        package_dirs=package_dir or [],
+        floating_base=floating_base,
+        loads=not no_loads,
+        ratings=ratings,
+        causes=cause or [],
+    )
+    source = open_source(target, options)
+    for note in source.notes:
+        say(note)
+    if export is not None:
+        _export(source, export, color == "rating", as_json)
+    else:
+        _serve(source, host, port, not no_open, color == "rating", as_json)
+
+
+def _check(color: str, export: Path | None, host: str, port: int) -> None:
+    """InputError for an option that cannot be met, before anything is read."""
+    from linkwise._core import InputError
+    from linkwise.view.export import check_file
+    from linkwise.view.server import check_address
 
     if color not in ("size", "rating"):
         raise InputError(f"--color: {color!r} is unknown; use size or rating")
-    by_rating = color == "rating"
     if export is not None:
         check_file(export)
     else:
         check_address(host, port)
-    source = open_source(
-        target,
-        Options(
-            model=model,
-            package_dirs=package_dir or [],
-            floating_base=floating_base,
-            loads=not no_loads,
-            ratings=ratings,
-            causes=cause or [],
-        ),
+
+
+def _export(source: Source, path: Path, by_rating: bool, as_json: bool) -> None:
+    from linkwise.view.export import write_html
+
+    written = write_html(source, path, by_rating=by_rating)
+    _report(
+        as_json,
+        {
+            "export": str(written.path),
+            "frames": written.frames,
+            "duration": written.duration,
+            "bytes": written.bytes,
+        },
+        f"{written.path}: {written.frames} frames, {written.duration:g} s, "
+        f"{written.bytes / 2**20:.1f} MiB. Opens in any browser, offline.",
     )
-    for note in source.notes:
-        say(note)
-    if export is not None:
-        written = write_html(source, export, by_rating=by_rating)
-        _report(
-            as_json,
-            {
-                "export": str(written.path),
-                "frames": written.frames,
-                "duration": written.duration,
-                "bytes": written.bytes,
-            },
-            f"{written.path}: {written.frames} frames, {written.duration:g} s, "
-            f"{written.bytes / 2**20:.1f} MiB. Opens in any browser, offline.",
-        )
-        return
+
+
+def _serve(
+    source: Source, host: str, port: int, open_browser: bool, by_rating: bool, as_json: bool
+) -> None:
+    from linkwise.view.live import show
 
     def started(address: str) -> None:
         _report(as_json, {"address": address}, f"{address} shows {source.title}; Ctrl-C ends.")
 
-    try:
+    with contextlib.suppress(KeyboardInterrupt):
         show(
             source,
             host=host,
             port=port,
-            open_browser=not no_open,
+            open_browser=open_browser,
             started=started,
             by_rating=by_rating,
         )
-    except KeyboardInterrupt:
-        return
 
 
 def _report(as_json: bool, facts: dict[str, Any], sentence: str) -> None:

@@ -142,6 +142,16 @@ def failure_message(model: Model, ending: Ending) -> str:
     )
 
 
+def _require_memory(schema: Schema, samples: int) -> None:
+    """MemoryError if a recording of so many samples would not fit into memory."""
+    # The chunks of the largest variable and the array that they are joined to exist together.
+    largest = max((variable.row_bytes for variable in schema.variables), default=0)
+    _core.require_memory(
+        float(samples) * (schema.row_bytes + largest),
+        f"a recording of {samples} samples in memory (output= writes them to disk)",
+    )
+
+
 def simulate(
     model: Model,
     *,
@@ -254,12 +264,7 @@ def simulate(
     )
     attrs |= _chosen(simulation, by_joint, by_body)
     if output is None:
-        # The chunks of the largest variable stand beside what they are joined to.
-        largest = max((variable.row_bytes for variable in schema.variables), default=0)
-        _core.require_memory(
-            float(sampled.size) * (schema.row_bytes + largest),
-            f"a recording of {sampled.size} samples in memory (output= writes them to disk)",
-        )
+        _require_memory(schema, sampled.size)
     record = _recorder(model, schema, attrs, sampled.size, output)
     run, ending = _record(model, simulation, record, schema, sampled, progress)
     if on_failure == "raise":
