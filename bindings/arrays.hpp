@@ -1,7 +1,6 @@
 #pragma once
-// NumPy arrays in and out: float64 rows with any leading axes. Anything else that NumPy can turn
-// into such an array (lists, integers, other strides) is turned; the common case costs no Python
-// call.
+// NumPy arrays in and out: float64 rows with any leading axes. Anything else that NumPy can convert
+// (lists, integers, other strides) is converted. The common case costs no Python call.
 #include <algorithm>
 #include <bit>
 #include <initializer_list>

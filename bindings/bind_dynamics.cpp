@@ -16,10 +16,10 @@ struct ForwardResult {
   PyReport report;
 };
 
-/// What to bring back: accelerations alone, with joint loads, or everything there is to tell.
+/// What to return: accelerations alone, with joint loads, or everything.
 enum class Wanted { accelerations, loads, full };
 
-/// Of what is None, the defaults of an evaluation.
+/// Options that are None keep the defaults of an evaluation.
 DynamicsOptions options_of(const std::string& method, const std::string& solver,
                            nb::handle tolerance, nb::handle stop, nb::handle max_iterations,
                            nb::handle solver_options) {

@@ -1,4 +1,5 @@
-// What a state alone tells: poses, Jacobians, energies, momenta, the mass matrix.
+// Quantities of a state without its accelerations: poses, Jacobians, energies, momenta, mass
+// matrix.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 

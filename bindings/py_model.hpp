@@ -10,8 +10,8 @@
 
 namespace linkwise::bindings {
 
-/// The argument `threads`: None stands for the default, which is not looked up where the work (in
-/// bodies) would not pay for a second thread.
+/// The argument `threads`; None stands for the default. The default is not looked up if the work
+/// (in bodies) would not pay for a second thread.
 inline int threads_of(nanobind::handle asked, size_t work) {
   if (asked.is_none()) return work < 512 ? 1 : default_threads();
   const int threads = nanobind::cast<int>(asked);

@@ -10,7 +10,7 @@ namespace linkwise::bindings {
 /// made.
 void read_solver_options(nanobind::handle given, DynamicsOptions& options);
 
-/// Do they fix how accurate solutions are?
+/// Do they fix the accuracy of solutions?
 bool gives_tolerance(nanobind::handle given);
 
 /// The keys with their defaults and meanings, as dictionaries.

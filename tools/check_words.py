@@ -27,7 +27,7 @@ LINE_START = re.compile(r"\n\s*(?://[/!<]*|#:?|\")?")
 PLACEHOLDER = re.compile(r"(?:^|/)[A-Z]+$")
 LINK_TARGET = re.compile(r"\]\([^)\s]*\)")
 
-COUNT = r"one|none|two|three|four|five|six|some|few|many|dozen|once|twice|an?|\d[\d,]*(?:\.\d+)?"
+COUNT = r"one|none|two|three|four|five|six|some|few|dozen|once|twice|an?|\d[\d,]*(?:\.\d+)?"
 UNIT = (
     r"ns|[µu]s|ms|s|nanoseconds?|microseconds?|milliseconds?|bytes?|KB|MB|numbers?|instructions?"
     r"|cycles?|operations?|flops|rows?|columns?|iterations?|evaluations?|calls?|reciprocals?"
@@ -35,6 +35,7 @@ UNIT = (
 THING = (
     r"body|joint|link|lane|step|run|call|solve|state|evaluation|member|sample|iteration|row|column"
     r"|block|hinge|path|piece|system|core|thread|chain|machine|element|file|folder|degree"
+    r")\b(?!\s+(?:may|can|must|has|is|takes|computes)\b"
 )
 JOINING = (
     r"an?|the|and|are|as|at|be|by|for|from|has|have|if|in|into|is|it|makes?|need|needs|of|on|or|so"
@@ -42,8 +43,8 @@ JOINING = (
 )
 #: Phrases that a reader stumbles over, and what to write instead.
 BANNED = {
-    rf"\b(?:{COUNT})(?:\s+(?!(?:{JOINING})\b)[a-z][\w-]*)?\s+an?\s+(?:{THING})\b": 'write "per"',
-    rf"\b(?:{UNIT})\s+an?\s+(?:{THING})\b": 'write "per"',
+    rf"\b(?:{COUNT})(?:\s+(?!(?:{JOINING})\b)[a-z][\w-]*)?\s+an?\s+(?:{THING})": 'write "per"',
+    rf"\b(?:{UNIT})\s+an?\s+(?:{THING})": 'write "per"',
     r"(?<![Tt]here\s)\b(?:is|are|was)\s+none\b(?!\s+of)": 'write "there is no ..."',
 }
 #: Parts of identifiers that are no terms of the field.

@@ -341,7 +341,7 @@ def _system(model: Model, trajectory: Trajectory) -> dict[str, Any]:
 
 
 def plot(comparison: Mapping[str, Any]) -> str:
-    """Time a call of every solver and guess, as SVG."""
+    """Time per call of every solver and guess, as SVG."""
     guesses = [entry["name"] for entry in _core.initial_guesses()]
     labels: dict[str, list[Dot]] = {}
     remarks: dict[str, str] = {}

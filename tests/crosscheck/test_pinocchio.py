@@ -98,7 +98,7 @@ def test_refused_robots_say_why(name):
 
 @pytest.mark.parametrize("name", sorted(ROBOTS.keys() - REFUSED.keys()))
 def test_joint_order_of_pinocchio(name):
-    """Asked for it, our joints and so q, v and tau come in Pinocchio's order."""
+    """If asked for, our joints, and so q, v and tau, come in Pinocchio's order."""
     reference = pin.buildModelFromUrdf(str(ROBOTS[name]))
     model = lw.load(ROBOTS[name], joint_order="pinocchio", mimic="independent")
     assert list(model.joint_names) == list(reference.names)[1:]

@@ -37,6 +37,7 @@ def test_a_bad_word_is_found(tmp_path, path, text, problem):
         ("a.cpp", "// See base/error.hpp and NAME.hpp.\nint pitch, outlook;\n"),
         ("a.md", "`src/linkwise/base`, <https://example.org/b/c.py>, `my_robot.urdf`\n"),
         ("a.md", "There is none. One is a body; two of a joint; 30 frames a second.\n"),
+        ("a.md", "how many samples a call computes, how many iterations a solve may take\n"),
         ("a.md", "```text\nmissing.py\n```\n[page](missing.md)\n"),
         ("a.py", '# It looks like a gift.\nx = "missing.py"\ncamera.look_at = 1\n'),
     ],

@@ -105,12 +105,13 @@ def _record(
     times: npt.NDArray[np.float64],
     progress: Callable[[Progress], object] | None,
 ) -> tuple[Run, Ending]:
-    """Simulate and record; whatever goes wrong, what was recorded is completed to a run."""
+    """Simulate and record. Whatever goes wrong, the samples so far become a complete run."""
     started = clock.monotonic()
     try:
         ending = run_time_loop(simulation, record, schema, times, progress)
     except BaseException as error:
-        # A function of the caller's (a drive, the progress) raised, or the disk is full.
+        # A function of the caller's (a drive, the progress) raised an exception, or the disk is
+        # full.
         said = {"outcome": "error", "message": f"{type(error).__name__}: {error}"}
         with contextlib.suppress(Exception):
             record.finish(said)
@@ -235,7 +236,7 @@ def simulate(
         max_step=max_step,
     )
     if "max_step" not in options and any(isinstance(d, Motion) for d in by_joint.values()):
-        # Joints at rest would let the steps grow until they pass over a whole short motion.
+        # While all joints rest, steps would grow until they pass over a whole short motion.
         options["max_step"] = float(sampled[-1]) / 50 or None
     count = optional_count("threads", threads)
     for joint, drive in by_joint.items():
@@ -273,7 +274,7 @@ def simulate(
 
 
 def raise_failure(model: Model, ending: Ending, run: Run) -> None:
-    """Raise what suits a run that did not reach its end."""
+    """Raise the error that belongs to a run that did not reach its end."""
     if ending.outcome == "interrupted":
         where = f"; the results until then are in {run.path}" if run.path else ""
         raise SimulationInterrupted(f"{ending.message}{where}", run)
@@ -290,8 +291,8 @@ def run_scenario(
 ) -> Run:
     """Simulate a scenario, given as a file or as `load_scenario` returned it.
 
-    `output`, where given, goes before the scenario's own `[output] path`; without either the run
-    stays in memory. See `simulate` for the rest.
+    `output` overrides the scenario's own `[output] path`; without either the run stays in memory.
+    See `simulate` for the rest.
     """
     from linkwise.scenario import Scenario, load_scenario
 

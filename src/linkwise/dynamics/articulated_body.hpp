@@ -1,7 +1,7 @@
 #pragma once
 // Articulated-body recursion for trees and every joint: the steps of recursion/steps.hpp body by
 // body, on one system or on lanes of systems; the branches of a large tree shared by threads
-// [hwang1988]. The joint load falls out of the outward sweep: w_n = Ya X a_p + pa.
+// [hwang1988]. The joint load is a by-product of the outward sweep: w_n = Ya X a_p + pa.
 #include <memory>
 #include <vector>
 
@@ -52,7 +52,7 @@ class ArticulatedBody {
 
   int failed_body() const { return sweeps_.failed_body; }
 
-  /// From now on the branches of a large tree are shared by threads, which influence no result.
+  /// From now on threads share the branches of a large tree. They influence no result.
   void share_branches(Executor executor) {
     branches_ = std::make_unique<Branches>(*model_);
     executor_ = executor;

@@ -60,7 +60,7 @@ class ArticulatedPaths {
 
  private:
   using Group = PathGroup<S>;
-  /// Positions that are worth a barrier between threads.
+  /// As many positions as make a barrier between threads worth its time.
   static constexpr int fewest_for_threads = 128;
 
   void add_group(int begin, std::vector<PathPlace>& place) {
@@ -74,7 +74,7 @@ class ArticulatedPaths {
     groups_.back().for_bodies([&](int k, int l, int n) { place[n] = {g, k, l}; });
   }
 
-  /// Path i to what carries it.
+  /// Connects path i with the body that carries it.
   void connect(int i, const std::vector<PathPlace>& place) {
     const auto& path = paths_.path[i];
     const PathPlace root = place[paths_.body_at(i, path.length - 1)];
@@ -151,7 +151,8 @@ class ArticulatedPaths {
     others_.calc_velocities(in, paths_.outer);
   }
 
-  /// External wrenches, and what the bodies on no path contribute to those that carry them.
+  /// Adds external wrenches, and what the bodies on no path contribute to the bodies that carry
+  /// them.
   void add_to_paths(const SweepInput<double>& in, bool with_loads) {
     if (!in.external && paths_.outer.empty()) return;
     const auto for_receivers = [&](auto&& f) {

@@ -107,7 +107,7 @@ struct BatchEvaluator::Work {
     return out_b_.data();
   }
 
-  /// Systems i ... i + lanes - 1 of rows of length n; the last one stands in beyond the end.
+  /// Systems i ... i + lanes - 1 of rows of length n; beyond the end the last one is repeated.
   const Group* pack(std::vector<Group>& to, const double* from, size_t n, size_t i, size_t count) {
     if (!from) return nullptr;
     to.resize(n);
@@ -126,7 +126,7 @@ struct BatchEvaluator::Work {
       for (size_t k = 0; k < n; ++k) to[(i + l) * stride + k] = from[k][l];
   }
 
-  /// The part of `all` that one cause is; none: no torques.
+  /// The part of `all` that belongs to one cause; none: no torques.
   template <class S>
   static SweepInput<S> alone(Cause cause, const SweepInput<S>& all, const S* passive,
                              const S* none) {

@@ -190,7 +190,7 @@ class Evaluator::Lease {
 Evaluator::Evaluator(const Model& model) : model_(&model) {}
 Evaluator::~Evaluator() = default;
 
-/// What computes the states: a method one by one, or else a kernel on lanes.
+/// What computes the states: a method, one state after the other, or a kernel on lanes.
 struct Evaluator::Pick {
   DynamicsMethod* method = nullptr;
   BatchMethod on_lanes = BatchMethod::articulated_body;

@@ -46,8 +46,8 @@ struct ForwardOutput {
 std::vector<Cause> causes_from_names(std::span<const std::string> names);
 
 /// Evaluations of one model, which must outlive it. Calls from several threads at once each borrow
-/// a workspace, and repeated calls allocate none. All throw InputError where the states ask for
-/// what the model has not: a wrench on a link without mass, accelerations of joints that are free.
+/// a workspace, and repeated calls allocate none. All throw InputError if the states do not fit the
+/// model: a wrench on a link without mass, accelerations of joints that are free.
 class Evaluator {
  public:
   explicit Evaluator(const Model& model);

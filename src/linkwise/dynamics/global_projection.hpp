@@ -3,8 +3,8 @@
 // through [hughes1985]: v = J u with the dense global projection matrix J (6 N x nv), so that the
 // constraint forces drop out,
 //     (J^T M J) du = tau - J^T (M a_0 + p),   a = J du + a_0.
-// O(N^3) time and O(N^2) memory: what the recursions and the constraint forces are measured
-// against.
+// It takes O(N^3) time and O(N^2) memory. The recursions and the constraint forces are compared
+// with it.
 #include <vector>
 
 #include "linkwise/dynamics/inverse_dynamics.hpp"

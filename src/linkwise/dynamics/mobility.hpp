@@ -1,6 +1,6 @@
 #pragma once
-// How easily each degree of freedom is moved: the diagonal of the inverse H^-1 of the joint-space
-// mass matrix, in O(N) and without H.
+// How easily each degree of freedom moves: the diagonal of the inverse H^-1 of the joint-space mass
+// matrix, in O(N) and without H.
 //
 // Inward, articulated inertias Y as in [featherstone2008, ch. 7]; outward, the mobility W_n of body
 // n, which takes a wrench on it to its acceleration with all else left free. For a joint P with

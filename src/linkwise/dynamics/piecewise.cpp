@@ -10,7 +10,7 @@ namespace {
 
 using Group = Lanes<native_lanes>;
 
-/// Below, three barriers of a microsecond cost more than a second thread saves.
+/// On shorter chains three barriers of a microsecond cost more than a second thread saves.
 constexpr int fewest_for_threads = 128;
 
 Executor executor_for(int n_bodies, int threads) {
@@ -39,7 +39,7 @@ class PiecewiseChain {
     f_.resize(A_.size());
     for (int g = 0; g < (n_pieces_ + native_lanes - 1) / native_lanes; ++g) {
       LaneBodies<Group> bodies(model, length_, [&](int k, int l) { return body_at(g, l, k); });
-      // The first body of a piece of stand-ins must have an inertia to invert; nothing feels it.
+      // The first body of a piece of fillers must have an inertia to invert. It acts on nothing.
       for (int l = 0; l < native_lanes; ++l)
         if (body_at(g, l, 0) >= n_)
           set_lanes<Group>(bodies[0].inertia, l, RigidBody<double>{1, {}, {{1, 0, 1, 0, 0, 1}}});
@@ -248,7 +248,8 @@ bool Piecewise::suits(const Model& model) {
 }
 
 int Piecewise::pieces(int n_bodies) {
-  // Eight fill the widest lanes; more only where they are long enough to hide the cut system.
+  // Eight pieces fill the widest lanes. There are more only if they are long enough to hide the cut
+  // system.
   int pieces = 8;
   while (pieces < 1024 && n_bodies / pieces > 128) pieces *= 2;
   return pieces;

@@ -1,18 +1,18 @@
 #pragma once
-// One long chain, cut into pieces: a piece a SIMD lane, groups of lanes over threads. Inside a
+// One long chain, cut into pieces: one piece per SIMD lane, groups of lanes over threads. Inside a
 // piece the articulated-body recursion; between pieces the constraint forces f of the cut joints,
 // from a small A f = b [sharf1993] whose "bodies" are the pieces (compare [anderson2000]).
 //
-// The recursion carries along Psi (6 x 5), what unit constraint forces at the outboard cut do to
-// the first body of the piece, and Lambda, beta, what they and the known forces do at that cut.
-// With J = Y^-1 of the first body of the floating piece, Q the cut joint's five constrained
-// directions:
+// The recursion carries along Psi (6 x 5), Lambda and beta. Psi is what unit constraint forces at
+// the outboard cut do to the first body of the piece. Lambda and beta are what they and the known
+// forces do at that cut. With J = Y^-1 of the first body of the floating piece, Q the cut joint's
+// five constrained directions:
 //     a_first = J (Q f_s + z tau_s - p - Psi f_{s+1}),
 //     (X^T Q)_{s+1}^T a_last = Psi^T a_first - Lambda f_{s+1} + beta,
 //     A_ss = Q^T J Q + (Psi^T J Psi + Lambda)_{s-1},    A_{s,s-1} = -(Psi^T J Q)_{s-1},
 //     du_k = D_k^-1 (u_k - r_k f_{s+1} - U_k^T (X a + c)),   r_k = joint row of Psi.
-// The number of pieces depends on the chain alone, and each lane's arithmetic on its own piece
-// alone: any number of threads gives the same bits.
+// The number of pieces depends on the chain alone, and the arithmetic of a lane depends on its own
+// piece alone. So any number of threads gives the same bits.
 #include <memory>
 #include <span>
 #include <vector>

@@ -45,7 +45,8 @@ inline std::span<const int> joints_of(const BodyTree& tree, int body) {
 BodyTree stack_massless(const MachineGraph& graph, const SpanningForest& forest,
                         const Lumps& lumps);
 
-/// Is a lump no body of its own, its inboard joint part of the next body's connection?
+/// Is a lump not a body of its own, because its inboard joint is part of the next body's
+/// connection?
 inline bool is_stacked(const Lumps& lumps, int lead) {
   return lumps.massless[lead] && lumps.outboard[lead] == 1;
 }

@@ -25,8 +25,8 @@ struct Outboard {
 };
 
 /// Chooses the joint that each link hangs on. A link is reached when all joints that lead to it
-/// were met, so that the best of them is known. Where links wait for each other, as around a
-/// directed cycle, the one met first goes ahead with what has led to it so far.
+/// were met, so the best of them is known. If links wait for each other, as around a directed
+/// cycle, the link met first goes ahead with the joints that have led to it so far.
 class Choice {
  public:
   explicit Choice(const MachineGraph& graph)
@@ -77,7 +77,7 @@ class Choice {
     }
   }
 
-  /// What is lost when a joint is cut, the most important first.
+  /// What is lost if a joint is cut, the most important first.
   std::tuple<bool, int, int, int> price(int j) const {
     const auto& joint = graph_.joints[j];
     return {joint.acts, -joint.freedom, -depth_[joint.parent], -j};

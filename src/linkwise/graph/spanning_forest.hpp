@@ -3,10 +3,10 @@
 // as in Drake's multibody topology (LinkJointGraph and SpanningForest), but a joint is never turned
 // round: its coordinates and its load stay those of its child against its parent.
 //
-// A link that is the child of several joints hangs on one of them; the others are cut. Cut are, in
-// this order of preference, joints that do not act along their coordinates, joints with more
-// freedom (fewer loads to find), joints whose parent is further from the ground (short loops), and
-// joints that come later in the file.
+// A link that is the child of several joints hangs on one of them; the others are cut. The cut
+// goes, in this order of preference, to joints that do not act along their coordinates, joints with
+// more freedom (fewer loads to find), joints whose parent is further from the ground (short loops),
+// and joints that come later in the file.
 #include <vector>
 
 #include "linkwise/graph/machine_graph.hpp"

@@ -1,8 +1,8 @@
 #pragma once
 // A tree cut at its branches, the natural pieces of a tree: subtrees small enough to be one
-// worker's share, and the trunk that carries them. Tip to base the branches come first, base to tip
-// the trunk, and the branches of either sweep need nothing of each other [hwang1988]. Cut by the
-// model alone, never by the threads.
+// worker's share, and the trunk that carries them. In an inward sweep the branches come first, in
+// an outward sweep the trunk does. Branches need nothing of each other [hwang1988]. Where the cuts
+// are depends on the model alone, never on the number of threads.
 #include <vector>
 
 #include "linkwise/model/model.hpp"
@@ -17,7 +17,7 @@ struct Branches {
   std::vector<KindRange> trunk;
   std::vector<Share> shares;
 
-  /// Empty, no shares, where cutting would not halve what has to be done one after the other.
+  /// Has no shares if cutting would not halve the work that has to be done one after the other.
   explicit Branches(const Model& model);
   bool any() const { return !shares.empty(); }
 };

@@ -20,7 +20,7 @@ Paths::Paths(const Model& model) {
     if (zone[n] != Zone::paths)
       append_to_ranges(zone[n] == Zone::inboard ? trunk : outer, at.kind, n);
   }
-  // Of outboard bodies equally high the first one continues the path.
+  // If several outboard bodies are equally high, the first one continues the path.
   std::vector<int> height(n_bodies, 0), outboard(n_bodies, -1);
   for (int n = n_bodies - 1; n >= 0; --n) {
     const int parent = model.topology[n].parent;

@@ -1,8 +1,8 @@
 #pragma once
-// A tree of revolute joints cut into paths, the pieces that run side by side in SIMD lanes. Every
-// body continues the path of that outboard body whose own subtree is the highest, so that position
-// k of a path is a body of height k above its farthest tip, and a path is shorter than the one that
-// it ends at: paths taken shortest first, aligned at their tips, find done what they need.
+// A tree of revolute joints cut into paths, which run side by side in SIMD lanes. Every body
+// continues the path of the outboard body with the highest subtree. So the body at position k of a
+// path is k above its farthest tip, and a path is shorter than the one that it ends at. Taken
+// shortest first and aligned at their tips, paths find done what they need.
 #include <vector>
 
 #include "linkwise/model/model.hpp"
@@ -20,7 +20,7 @@ struct Paths {
   std::vector<Path> path;
   /// Joints of other kinds between the ground and the first revolute ones, as of a floating base.
   std::vector<KindRange> trunk;
-  /// What a joint of another kind carries farther out, and all beyond it.
+  /// Bodies on joints of other kinds farther out, and all bodies beyond them.
   std::vector<KindRange> outer;
 
   explicit Paths(const Model& model);
@@ -28,13 +28,14 @@ struct Paths {
   int body_at(int path_index, int position) const {
     return body[path[path_index].begin + position];
   }
-  /// Positions of groups of `lanes` paths, the shortest ones together: sweeps on lanes take as many
-  /// steps. The first group may have idle lanes.
+  /// Sum of the lengths of groups of `lanes` paths, the shortest ones together: the number of steps
+  /// of a sweep on lanes. The first group may have idle lanes.
   int positions(int lanes) const;
 };
 
-/// Do paths side by side pay? Measured (benchmarks/cpp/crossovers.cpp), a position of a group costs
-/// what a body costs alone, and a path's way into its lane and out of it three quarters of that.
+/// Do paths side by side pay? Measured (benchmarks/cpp/crossovers.cpp): a position of a group costs
+/// as much as one body alone; taking a path into its lane and out of it costs three quarters of
+/// that.
 bool paths_fill(const Model& model, int lanes);
 
 }  // namespace linkwise

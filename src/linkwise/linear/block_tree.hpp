@@ -1,12 +1,12 @@
 #pragma once
-// The symmetric positive definite block system A x = b on a forest: one node a joint, one block of
-// 0 to 6 rows a node. Node i couples to its parent and, through the body between them, to its
+// The symmetric positive definite block system A x = b on a forest: one node per joint, one block
+// of 0 to 6 rows per node. Node i couples to its parent and, through the body between them, to its
 // siblings (A f = b of [sharf1993], eqs. (10)-(13), for trees).
 //
-// A body with several outboard joints is a hub. Its joints all couple with each other, a dense
-// clique whose forming and factoring would cost the square and the cube of their number. A hub
-// keeps the factors instead: with C the body's 6 x 6 compliance at its inboard joint, K the inboard
-// joint's constrained directions and H_i the lever of outboard joint i,
+// A body with several outboard joints is a hub. Its joints all couple with each other. Forming that
+// dense clique would cost the square of their number, factoring it the cube. A hub keeps the
+// factors instead: with C the body's 6 x 6 compliance at its inboard joint, K the inboard joint's
+// constrained directions and H_i the lever of outboard joint i,
 //     A_is = H_i C H_s^T   (siblings i, s),      A_ip = -H_i C K^T   (joint i with inboard joint
 //     p),
 // so that every operation costs O(outboard joints) (compare [baraff1996], which keeps the body's

@@ -1,6 +1,6 @@
 #pragma once
-// L D L^T of one symmetric block, without square roots: five dependent divisions a 5 x 5 block
-// instead of five square roots and divisions, which is what a chain's recursion waits for.
+// L D L^T of one symmetric block, without square roots: five dependent divisions per 5 x 5 block
+// instead of five square roots and divisions. These are what the recursion along a chain waits for.
 // Packed lower triangle, entry (i, j) at i (i + 1) / 2 + j; the diagonal holds 1 / D.
 
 #include <array>

@@ -42,7 +42,7 @@ void check_inertia(const Machine& machine, int l, bool welded, const Inertia<dou
                    " kg m2); give a positive semidefinite inertia about the centre of mass");
 }
 
-/// A lump without mass may pass motion on to one joint, or to several in the recursion.
+/// A lump without mass may carry one joint, or several in the recursion.
 void check_massless(const Machine& machine, const Lumps& lumps, std::vector<Note>& notes) {
   for (int j : lumps.moving) {
     const int l = machine.graph.joints[j].child;

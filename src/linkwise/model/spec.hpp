@@ -1,5 +1,5 @@
 #pragma once
-// What a user says about a machine: links and joints by name, in the user's frames. ModelBuilder
+// The user's description of a machine: links and joints by name, in the user's frames. ModelBuilder
 // collects it; the constructor of Model turns it into the arrays that the sweeps run over.
 #include <array>
 #include <limits>

@@ -60,8 +60,8 @@ void principal_moments(const Sym3<double>& I, double out[3]) {
 }
 
 bool clearly_negative(double mass, const double principal[3]) {
-  // CAD programs print noise such as -1e-20 kg m2: what a radius of gyration of a micrometre gives
-  // is no inertia that anybody meant.
+  // CAD programs print noise such as -1e-20 kg m2. Nobody means an inertia with a radius of
+  // gyration below a micrometre.
   return principal[0] < -std::max(1e-6 * principal[2], 1e-12 * mass);
 }
 

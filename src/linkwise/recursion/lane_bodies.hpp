@@ -48,8 +48,8 @@ struct LaneBody {
   HingePlacement<S> placement;
   S theta;
   Inertia<S> inertia;
-  S stand_in;  ///< 1 for a massless stand-in beyond the end of a piece, else 0: keeps D positive
-  /// Index of its placement where some lane's joint is no hinge, or -1.
+  S stand_in;  ///< 1 for a massless filler beyond the end of a piece, else 0; it keeps D positive
+  /// Index of its placement if some lane's joint is not a hinge, or -1.
   int skew = -1;
 };
 
@@ -64,7 +64,8 @@ class LaneBodies {
  public:
   static constexpr int lanes = lane_count<S>;
 
-  /// body_at(k, l): the body of position k in lane l; none, a stand-in, outside the model.
+  /// body_at(k, l): the body of position k in lane l; a number outside the model stands for a
+  /// filler.
   template <class BodyAt>
   LaneBodies(const Model& model, int length, BodyAt&& body_at) : body_(length) {
     for (int k = 0; k < length; ++k) {
@@ -128,7 +129,7 @@ class LaneBodies {
     to.stand_in[l] = 0;
   }
 
-  /// Where any lane's joint is no hinge the whole position takes full placements, theta included.
+  /// If some lane's joint is not a hinge, the whole position takes full placements, theta included.
   template <class BodyAt>
   void set_skew(const Model& model, int k, BodyAt&& body_at) {
     const auto in_model = [&](int n) { return n >= 0 && n < model.n_bodies(); };

@@ -1,6 +1,6 @@
 #pragma once
 // The articulated-body recursion along the paths of one group, one path per lane, by the steps of
-// steps.hpp. How groups follow each other is in dynamics/articulated_paths.hpp.
+// steps.hpp. The order of the groups is in dynamics/articulated_paths.hpp.
 #include <algorithm>
 #include <array>
 #include <vector>

@@ -2,9 +2,10 @@
 // The articulated-body recursion, one body at a time [featherstone1983; featherstone2008, ch. 7]:
 //     Y_n = M_n + sum X_k^T Ya_k X_k,  U = Y P,  D = P^T U + armature,  u = tau - P^T p
 //     Ya = Y - U D^-1 U^T,  pa = p + Ya c + U D^-1 u;   du = D^-1 (u - U^T (X a_p + c))
-// for joints of one axis; stack_steps.hpp has the others. Here is what is computed, and nothing
-// about the order: whoever sweeps calls these. Plain values in and out, no memory of their own, any
-// scalar S, so that every schedule and every kind of processor can share them.
+// for joints of one axis; stack_steps.hpp has the others. This file says what is computed and
+// nothing about the order, which is the schedule's. The functions take and return plain values of
+// any scalar S and have no memory of their own, so every schedule and every kind of processor can
+// share them.
 //
 // Ours differs from the book in the joint axis along z, which makes U a column and D a number, and
 // in the zeros that eliminating a hinge leaves (hinge.hpp).
@@ -17,8 +18,8 @@
 
 namespace linkwise {
 
-/// What a body asks of the one that carries it: the wrench Y a + p for the carrier's acceleration
-/// a.
+/// What a body contributes to its parent: it takes the wrench Y a + p from a parent with the
+/// acceleration a.
 template <class S>
 struct Contribution {
   ArticulatedInertia<S> Y;
@@ -140,8 +141,8 @@ struct NoCut {
   }
 };
 
-/// du; a = X a_p becomes the body's own acceleration. `cut` takes from the torque what forces at
-/// cuts farther out ask of the joint.
+/// Returns du; a = X a_p becomes the body's own acceleration. `cut` takes from the torque what
+/// forces at cuts farther out demand of the joint.
 template <class J, class S, class Cut = NoCut>
 LW_INLINE S accelerate(const EliminatedAxis<S>& axis, const Motion<S>& c, double pitch,
                        Motion<S>& a, const Cut& cut = {}) {
@@ -154,7 +155,8 @@ LW_INLINE S accelerate(const EliminatedAxis<S>& axis, const Motion<S>& c, double
 /// Constrained directions of a revolute joint, which is where chains are cut.
 inline constexpr int cut_rows = 5;
 
-/// What unit constraint forces at the outboard cut do inboard, carried along by the elimination.
+/// What unit constraint forces at the outboard cut do to bodies inboard; the elimination carries it
+/// along.
 template <class S>
 struct CutForces {
   Force<S> Psi[cut_rows];  ///< on the body at hand
@@ -184,7 +186,7 @@ LW_INLINE void carry_cut_forces(const Place& place, const EliminatedAxis<S>& axi
   }
 }
 
-/// For accelerate(): the torque less what the forces f at the outboard cut ask of the joint.
+/// For accelerate(): the torque less what the forces f at the outboard cut demand of the joint.
 template <class S>
 struct CutTorque {
   const S *row, *f;
@@ -194,8 +196,8 @@ struct CutTorque {
   }
 };
 
-/// The load of a body's inboard joint by Newton and Euler: w holds the loads of its outboard
-/// joints, seen at the body; the body's own share is added.
+/// The load of a body's inboard joint by Newton and Euler. w holds the loads of its outboard
+/// joints, seen at the body, and the body's own share is added to it.
 template <class Body, class S>
 LW_INLINE void inward_load(const Body& body, const Motion<S>& a, const Force<S>& bias,
                            Force<S>& w) {

@@ -1,5 +1,5 @@
 #pragma once
-// The two numbers by which the recursions judge their own rounding.
+// The two numbers by which the recursions judge their rounding errors.
 
 namespace linkwise {
 
@@ -7,7 +7,8 @@ namespace linkwise {
 /// columns that move a body alike leave rounding noise below it, not zero.
 inline constexpr double smallest_pivot = 1e-13;
 
-/// Accelerations that miss their equations by more than this part of the largest one are refined.
+/// Accelerations are refined if they miss their equations by more than this part of the largest
+/// one.
 inline constexpr double acceptable_violation = 1e-12;
 
 }  // namespace linkwise

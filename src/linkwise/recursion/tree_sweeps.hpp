@@ -1,8 +1,8 @@
 #pragma once
 // The three sweeps of the articulated-body recursion over chosen ranges of a tree, and what they
-// keep of every body. A schedule owns one, decides which ranges are swept when and by whom, and
-// fills in what it computes elsewhere: the motion of bodies that carry a range, and what comes back
-// to them.
+// keep of every body. A schedule owns one. It decides which ranges are swept when and by which
+// thread. It fills in what it computes elsewhere: the motion of the bodies that carry a range, and
+// what is contributed to them.
 #include <algorithm>
 #include <atomic>
 #include <vector>
@@ -101,7 +101,7 @@ struct TreeSweeps {
     if (with_loads && reduced.empty()) reduced.resize(model.n_bodies());
   }
 
-  /// Of several the outermost is named, whichever thread finds one first.
+  /// Of several failed bodies the outermost is named, whichever thread finds one first.
   void fail(int n) {
     int known = failed_body;
     while (known < n && !failed_body.compare_exchange_weak(known, n)) {
@@ -131,7 +131,7 @@ struct TreeSweeps {
     });
   }
 
-  /// As calc_velocities<true>() of a machine at rest.
+  /// What calc_velocities<true>() gives for a machine at rest.
   void rest(const SweepInput<S>& in) {
     for (int n = 0; n < model.n_bodies(); ++n) {
       body[n].velocity = {};

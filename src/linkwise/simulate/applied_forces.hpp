@@ -26,8 +26,8 @@ class AppliedForces {
   /// The joint whose torque or wrench is not finite, or -1.
   int joint_with_bad_force(size_t member) const;
 
-  /// Adds to drive() what moves or holds the joints of given motion: `total`, the torques
-  /// [members][nv] that their accelerations take, less what acts by itself.
+  /// Adds to drive() the torques of joints of given motion: `total`, the torques [members][nv] that
+  /// their accelerations take, less what acts by itself.
   void add_holding_torques(const double* total);
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-// What a state must satisfy beside its equations of motion: unit quaternions, and joints that
-// follow or rest where their drives say.
+// What a state must satisfy besides its equations of motion: quaternions of unit length, and joints
+// that follow a given motion or are locked.
 #include <memory>
 #include <vector>
 

@@ -34,9 +34,9 @@ constexpr NumericsEntry table[] = {
      "velocities [sharf1993] (method constraint_force only)"},
 };
 
-/// What a run's tolerance leaves to one step: the errors of hundreds of steps add up. Measured on
-/// random trees (theory of integration): it keeps the energy of nearly all of them within ten
-/// tolerances over 10 s, for a third more evaluations.
+/// The share of a run's tolerance that one step may take, because the errors of hundreds of steps
+/// add up. Measured on random trees (docs/theory/integrate.md): it keeps the energy of nearly all
+/// of them within ten tolerances over 10 s, for a third more evaluations.
 constexpr double step_share = 0.1;
 
 bool positive(double x) { return x > 0 && std::isfinite(x); }

@@ -24,8 +24,8 @@ struct Instant {
   const SimulationStatistics& statistics;
 };
 
-/// Along what a quantity has its columns: the coordinates [nq], the rates [nv], the joints
-/// [n_joints][6], the bodies that they carry [n_joints][6], or nothing [1].
+/// The columns of a quantity: one per coordinate [nq], rate [nv], joint [n_joints][6] or body that
+/// a joint carries [n_joints][6], or a single one [1].
 enum class Axis { coordinates, rates, joints, bodies, none };
 std::string_view to_string(Axis axis);
 

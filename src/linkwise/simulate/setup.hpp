@@ -38,7 +38,8 @@ struct Setup {
   std::vector<Drive> drives;  ///< one per joint
   std::vector<Wrench> wrenches;
 
-  /// Settles what follows from the drives: before the first start, and after a drive has changed.
+  /// Computes what follows from the drives. Call it before the first start, and after a drive has
+  /// changed.
   void settle();
   /// The model with the joints of given motion prescribed.
   const Model& driven() const { return driven_ ? *driven_ : *model; }

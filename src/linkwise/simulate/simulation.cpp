@@ -12,7 +12,7 @@
 namespace linkwise {
 namespace {
 
-// Beyond this an acceleration is as good as infinite; below, no sum of a step can overflow, so a
+// Above this an acceleration counts as infinite. Below it no sum within a step can overflow, so a
 // member that fails cannot end the others.
 constexpr double largest_acceleration = 1e100;
 
@@ -106,7 +106,7 @@ bool Simulation::follows_error_test() const {
   if (!options.follow_error_test || options.state != StateChoice::joint_rates) return false;
   if (solver.empty() || find_solver(solver).kind == SolverKind::direct) return false;
   if (options.dynamics.solver_options.stop != StopRule::energy_norm) return false;
-  // Started from zero, solutions are to depend on time and state alone.
+  // With the guess zero, solutions must depend on time and state alone.
   if (options.dynamics.initial_guess == "zero") return false;
   return !find_integrator(options.integrator).fixed_step;
 }
@@ -178,7 +178,8 @@ Outcome Simulation::judge(double t, const DynamicsReport& report, const double* 
   iterations_ += report.iterations;
   double sum = 0;
   for (int i = 0; i < n; ++i) sum += du[i];
-  // Where rounding keeps the forces from what the error test would like, the fixed tolerance does.
+  // If rounding keeps the forces from the accuracy that the error test asks for, the fixed
+  // tolerance is good enough.
   const bool good_enough =
       solver_tolerance_ && report.outcome == Outcome::stagnated &&
       report.error_estimate <= setup_->options.dynamics.solver_options.tolerance;
@@ -190,7 +191,8 @@ Outcome Simulation::judge(double t, const DynamicsReport& report, const double* 
 Ending Simulation::failure(size_t member, double t, Outcome outcome, int body,
                            const double* du) const {
   const Model& m = model();
-  // What was given to a joint before what came out at it: one bad torque spoils all accelerations.
+  // Looks at the torques first and then at the accelerations, because one bad torque spoils all
+  // accelerations.
   int joint = body < 0 ? forces_->joint_with_bad_force(member) : -1;
   for (int j = 0; j < m.n_joints() && joint < 0; ++j) {
     const JointInfo& info = m.joints[j];
@@ -250,8 +252,8 @@ void Simulation::impose(double t, double* y) {
                   given_.data() + i * nv());
 }
 
-/// Rows of members that ended become those of one that did not, so that the lanes compute something
-/// sound there.
+/// Rows of members that ended become copies of a member that did not, so that their lanes compute
+/// something sound.
 void Simulation::stand_in(double* y) const {
   size_t from = 0;
   while (from < members_ && !endings_[from].ok()) ++from;
@@ -288,7 +290,7 @@ bool Simulation::reach(double t) {
     Outcome outcome = Outcome::interrupted;
     if (!interrupted_ || !interrupted_()) outcome = integrator_->step(t);
     if (outcome == Outcome::converged) continue;
-    // What failed within the step says more than that it failed.
+    // The failure within the step says more than the failure of the step.
     return end_all(failure_.outcome == outcome
                        ? failure_
                        : Ending{outcome, integrator_->time(), failure_.joint, describe(outcome)});
@@ -336,7 +338,7 @@ bool Simulation::write_sample(double t, const Sample& sample) {
   return true;
 }
 
-/// What moves or holds joints of given motion: the torque of the motion less what acts by itself.
+/// The drive torques of joints of given motion: what the motion takes, less what acts by itself.
 void Simulation::add_holding_torques() {
   if (!inverse_) inverse_ = std::make_unique<BatchEvaluator>(model());
   total_.resize(members_ * nv());

@@ -8,12 +8,13 @@ namespace {
 
 /// Share of the step's error.
 constexpr double share = 0.1;
-/// The first steps are tiny and grow a hundredfold within a few: what one allows would be far too
-/// much for those that build on its accelerations. Measured on the maneuvers of [sharf1993]: with
-/// less the forces' errors show in which steps are taken, and the end point is 3 times further off.
+/// The first steps are tiny and grow a hundredfold within a few steps. The error that such a step
+/// allows would be far too large for the steps that build on its accelerations. Measured on the
+/// maneuvers of [sharf1993]: with less, errors of the forces change which steps are taken, and the
+/// end point is 3 times further off.
 constexpr int settling_steps = 10;
 constexpr double growth = 100.0;
-/// Of the relative tolerance: more is never asked for, since rounding is near.
+/// Smallest part of the relative tolerance that is asked for; beyond it rounding is near.
 constexpr double least_relative = 0.01;
 
 }  // namespace

@@ -1,5 +1,5 @@
 #pragma once
-// How accurately the constraint forces have to be known, so that the integrator does not notice.
+// How accurately the constraint forces must be known for the integrator not to notice their error.
 //
 // An error e of the forces is an error a of the joints' accelerations with
 //     ||e||_A^2 = a^T H a    (theory of constraint forces),
@@ -34,7 +34,7 @@ class SolverTolerance {
   double step_relative_, step_absolute_, relative_;
   std::shared_ptr<EnergyBound> bound_;
   double time_ = 0, last_step_ = 0;
-  double rate_error_ = 0;  ///< in units of the weights, that an energy norm of 1 makes a second
+  double rate_error_ = 0;  ///< in units of the weights, that an energy norm of 1 makes per second
   int steps_ = 0;
 };
 

@@ -4,11 +4,10 @@
 // Every method here knows, almost for free, by how much an iteration lowered the squared A-norm of
 // the error: D_k = ||e_k||^2 - ||e_{k+1}||^2 (conjugate gradients: step length times (z, r)
 // [hestenes1952]; a relaxation: the squares of its local steps). The error left after iteration k
-// is the sum of the decreases to come, ||e_{k+1}||^2 = D_{k+1} + D_{k+2} + ...  [strakos2002]. What
-// fraction of D_k that sum is, is read off the decreases seen so far: the largest ratio of "all
-// that followed" to "this one" over the last two digits of convergence (the safeguard of
-// [meurant2021]), and the geometric tail that the last decreases point to, which a slow linear
-// iteration needs.
+// is the sum of the decreases to come, ||e_{k+1}||^2 = D_{k+1} + D_{k+2} + ...  [strakos2002]. The
+// ratio of that sum to D_k is read off the decreases so far: the largest ratio of "all that
+// followed" to "this one" over the last two digits of convergence (the safeguard of [meurant2021]),
+// and the geometric tail that the last decreases point to, which a slow linear iteration needs.
 
 #include <vector>
 

@@ -36,8 +36,8 @@ void StopTest::start(const SolverOptions& options, const ScaledTree* scaling, in
 
 void StopTest::start_correction(double solution_energy, int max_iterations) {
   max_iterations_ = iterations_ + max_iterations;
-  // A rough residual holds the slow modes that decide its energy, but hides them for a while: the
-  // contraction of the main iteration tells of them.
+  // A rough residual contains the slow modes that decide its energy, but does not show them for a
+  // while. The contraction of the main iteration does.
   const double contraction = estimate_.contraction();
   estimate_.start(contraction < 1.0 ? contraction : 0.0);
   solution_energy_ = solution_energy;
@@ -63,16 +63,15 @@ double StopTest::relative_error() const {
              : error;
 }
 
-// The extrapolated tail of the decreases errs on the low side when convergence pauses, the bound on
-// the high side by up to the condition number. Measured on rigid chains of every kind and
-// on random trees, the larger of the tail and half (in the norm) of the bound is right to a factor
-// of about three.
+// The extrapolated tail of the decreases is too low when convergence pauses. The bound is too high,
+// by up to the condition number. Measured on rigid chains of every kind and on random trees: the
+// larger of the tail and half (in the norm) of the bound is right to a factor of about three.
 double StopTest::calc_squared_error(const IterationStep& step) const {
   if (step.squared_error >= 0.0) return step.squared_error;
   const double tail = estimate_.squared_error();
-  // No contraction seen yet: only a change that would do even if the slowest mode were 1e8 times
-  // slower than what the iteration has met tells anything. It accepts a guess that is exact
-  // already.
+  // No contraction has been seen yet. A change says something only if it would be small enough even
+  // for a slowest mode that is 1e8 times slower than what the iteration has met. This accepts a
+  // guess that is exact already.
   if (!std::isfinite(tail))
     return unseen_condition * std::max(std::abs(step.decrease), step.squared_bound);
   const double share = correcting_ ? 1.0 : 0.25;
@@ -94,7 +93,7 @@ bool StopTest::meets_energy_rule(const IterationStep& step) const {
   constexpr double correction_accuracy = 1e-4;
   const double target = std::max(
       bound * bound, correcting_ ? correction_accuracy * std::max(0.0, estimate_.total()) : 0.0);
-  // The error is at least a hundredth of the last decrease in practice: that settles most steps.
+  // In practice the error is at least a hundredth of the last decrease, which decides most steps.
   return 0.01 * std::abs(step.decrease) <= target && calc_squared_error(step) <= target;
 }
 

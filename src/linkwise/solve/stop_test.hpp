@@ -1,5 +1,5 @@
 #pragma once
-// The stop tests of the iterative solvers, one object a solve.
+// The stop tests of the iterative solvers, one object per solve.
 
 #include <span>
 
@@ -39,7 +39,7 @@ class StopTest {
   /// Is a guess with a residual of this square, in the norm of the preconditioner's inverse, good
   /// enough as it is?
   bool accepts_start(double preconditioned_square);
-  /// Counts an iteration; true when the solver has to stop, with outcome() telling why.
+  /// Counts an iteration. True if the solver has to stop; outcome() tells why.
   bool stops(const IterationStep& step);
   /// The solver stops on its own account; `converged` when there is nothing left to improve.
   void stop(Outcome outcome) {

@@ -85,7 +85,7 @@ def test_subsets_are_the_same_numbers(chain):
 
 
 def pace(monkeypatch, count, pieces=1):
-    """Fix how many samples a call computes, or in how many pieces an interval is."""
+    """Fix how many samples a call computes, or how many parts an interval has."""
 
     def adapt(self, spent):
         self.count, self.pieces = count, pieces

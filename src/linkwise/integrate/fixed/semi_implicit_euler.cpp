@@ -1,6 +1,6 @@
 /// Symplectic (semi-implicit) Euler [hairer2006, I.1.2]:
 ///   v(t + h) = v + h vdot(t, q, v),   q(t + h) = q + h qdot(q, v(t + h)).
-/// Order 1, one evaluation a step; where the forces are conservative the energy error stays
+/// Order 1, one evaluation per step. If the forces are conservative, the energy error stays
 /// bounded. Between steps it is linear, which is what the method assumes of q.
 #include <cstddef>
 #include <vector>

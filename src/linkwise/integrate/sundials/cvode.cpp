@@ -24,14 +24,14 @@ namespace {
 
 using namespace sundials;
 
-/// Up to this many unknowns the Newton matrix is formed by differences, one evaluation a column,
-/// and factorised; above, GMRES needs one evaluation an iteration and no matrix.
+/// Up to this many unknowns the Newton matrix is formed by differences, one evaluation per column,
+/// and factorised. Above, GMRES needs one evaluation per iteration and no matrix.
 constexpr int largest_dense_size = 400;
 constexpr int krylov_dimension = 30;
 
-/// Quaternions that drifted this far from unit length are put back by a restart of the method: its
-/// history cannot be projected. The motion does not feel the drift (see OdeSystem), the error
-/// weights would.
+/// Quaternions that drifted this far from unit length are put back by a restart of the method,
+/// because its history cannot be projected. The motion does not feel the drift (see OdeSystem), but
+/// the error weights would.
 constexpr double largest_drift = 1e-3;
 
 class Cvode final : public Integrator {
@@ -210,8 +210,8 @@ Outcome Cvode::classify(int flag) const {
   }
 }
 
-/// Why the steps became too small. Before a time or state that cannot be evaluated, they do so
-/// gradually: CVODE creeps up to it.
+/// Why the steps became too small. In front of a time or state that cannot be evaluated, CVODE
+/// creeps up to it with ever smaller steps.
 Outcome Cvode::no_smaller_step() const {
   constexpr long recent = 20;
   const bool failed = failure_ != Outcome::converged && steps_since_failure_ <= recent;

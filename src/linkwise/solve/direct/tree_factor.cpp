@@ -76,7 +76,8 @@ Outcome TreeFactor::factor(const BlockTree& A, std::span<const char> cut) {
   return Outcome::converged;
 }
 
-/// Brings node i's pivot block up to date with the elimination of its subtree and later siblings.
+/// Applies to node i's pivot block what the elimination of its subtree and of later siblings has
+/// changed.
 void TreeFactor::complete_pivot(const BlockTree& A, int i) {
   with_dim(dim_[i], [&](auto d) {
     double* const lower = nodes_[i].lower.data();

@@ -81,7 +81,7 @@ void CoarseSpace::reserve() {
   }
 }
 
-/// responses[k] = J^-1 e_k with a unit force in component k of each of the nodes, one a piece.
+/// responses[k] = J^-1 e_k with a unit force in component k of each of the nodes, one per piece.
 void CoarseSpace::respond(const BlockTree& A, TreeFactor& pieces, std::span<const int> nodes,
                           std::array<std::vector<double>, 6>& responses) {
   for (int k = 0; k < 6; ++k) {

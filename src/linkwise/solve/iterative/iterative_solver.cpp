@@ -1,11 +1,10 @@
 // The frame around every iteration: scale, iterate, unscale, verify.
 //
-// An iteration sees its own residual, carried along by recurrences, shrink for ever; the true one
-// does not: rounding leaves an error of about epsilon ||x~|| / sqrt(smallest eigenvalue) in the
-// A-norm. Where that may matter, the true residual of the result is formed with the system as given
-// and, if it is not clearly small enough, the correction that it asks for is computed by the same
-// method. The A-norm of that correction *is* the error of the result, measured and not
-// extrapolated.
+// An iteration sees its own residual, which recurrences carry along, shrink for ever. The true
+// residual does not: rounding leaves an error of about epsilon ||x~|| / sqrt(smallest eigenvalue)
+// in the A-norm. Where that may matter, the true residual of the result is formed with the system
+// as given. If it is not clearly small enough, the same method computes the correction that it asks
+// for. The A-norm of that correction *is* the error of the result, measured and not extrapolated.
 
 #include "linkwise/solve/iterative/iterative_solver.hpp"
 
@@ -109,7 +108,7 @@ Report IterativeSolver::run(const BlockTree& A, std::span<const double> b, std::
   Report report{stop_.outcome(), stop_.iterations(), stop_.relative_error(), -1};
   if (!std::isfinite(sum_of_squares(x, executor()))) report.outcome = Outcome::not_finite;
   const bool ended = report.ok() || report.outcome == Outcome::stagnated;
-  // A guess that is all but exact leaves nothing to see decrease: the residual tells.
+  // If the guess is almost exact, no decrease can be seen, and the residual decides.
   if (ended && options_.stop == StopRule::energy_norm && (!report.ok() || rounding_may_matter(x_)))
     verify(b, x, report);
   report.iterations = stop_.iterations();

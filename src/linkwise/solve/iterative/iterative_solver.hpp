@@ -24,7 +24,7 @@ class IterativeSolver : public LinearSolver {
     scaled_.set_executor(options.executor);
   }
 
-  /// Once a solve, after scaling. An outcome other than `converged` ends the solve.
+  /// Once per solve, after scaling. An outcome other than `converged` ends the solve.
   virtual Outcome prepare(const BlockTree& A) {
     static_cast<void>(A);
     return Outcome::converged;

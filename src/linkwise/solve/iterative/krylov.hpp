@@ -15,7 +15,7 @@ namespace linkwise {
 
 /// Estimate of the smallest eigenvalue of the preconditioned matrix from the coefficients of
 /// conjugate gradients, by incremental condition estimation [bischof1990] of the bidiagonal
-/// Cholesky factor of the Lanczos matrix: a dozen operations an iteration, as in [meurant2019].
+/// Cholesky factor of the Lanczos matrix: a dozen operations per iteration, as in [meurant2019].
 class SmallestRitz {
  public:
   /// step: alpha_k of this iteration; growth: beta of the previous one.
@@ -48,8 +48,8 @@ class SmallestRitz {
   double norm_squared_ = 0.0, last_ = 0.0, previous_step_ = 1.0;
 };
 
-/// Why conjugate gradients cannot go on: the residual is at rounding level, or the matrix (or its
-/// preconditioner) is not positive definite, or numbers have overflowed.
+/// Why conjugate gradients cannot go on: the residual is at rounding level, the matrix or its
+/// preconditioner is not positive definite, or numbers have overflowed.
 inline Outcome breakdown(double rz, double curvature, double first_rz) {
   if (!std::isfinite(rz) || !std::isfinite(curvature)) return Outcome::not_finite;
   return std::abs(rz) <= 1e-28 * std::abs(first_rz) ? Outcome::converged
