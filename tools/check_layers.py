@@ -18,7 +18,8 @@ from import_graph import SUFFIXES, arrows, circles, import_graph, include_graph,
 #: dynamics: solve never sees a mechanism, constraint fills the systems of linear without solving.
 BASE = {"base", "simd"}
 NUMERICS = BASE | {"exec", "linear", "solve"}
-MOTION = BASE | {"spatial", "bodies", "joints", "graph", "model", "kinematics"}
+MODEL = BASE | {"spatial", "joints", "bodies", "graph", "model"}
+MOTION = MODEL | {"kinematics"}
 MECHANICS = MOTION | {"forces", "constraint"}
 LAYERS = {
     "base": set(),
@@ -30,8 +31,8 @@ LAYERS = {
     "joints": BASE | {"spatial"},
     "bodies": BASE | {"spatial", "joints"},
     "graph": {"base"},
-    "model": BASE | {"spatial", "joints", "bodies", "graph"},
-    "kinematics": MOTION,
+    "model": MODEL - {"model"},
+    "kinematics": MODEL,
     "forces": MOTION,
     "constraint": MOTION | {"exec", "linear", "forces"},
     "recursion": MOTION | {"exec"},
