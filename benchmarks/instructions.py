@@ -1,4 +1,4 @@
-"""Instructions and time a body of one evaluation: what a method asks of the processor.
+"""Instructions and time per body of one evaluation: what a method asks of the processor.
 
     python -m benchmarks instructions [--sizes 7 30 300] [-o DIR]
 

@@ -1,4 +1,4 @@
-"""One forward dynamics of a chain of a million links: time and memory a link, by method.
+"""One forward dynamics of a chain of a million links: time and memory per link, by method.
 
     python -m benchmarks million_links [--links N] [-o DIR]
 

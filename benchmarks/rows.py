@@ -1,4 +1,4 @@
-"""What a run finds: one row a contestant and machine."""
+"""What a run finds: one row per contestant and machine."""
 
 from __future__ import annotations
 

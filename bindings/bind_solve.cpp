@@ -366,7 +366,8 @@ void bind_system(nb::module_& m) {
   nb::class_<PyConstraintSystem>(
       m, "ConstraintSystem",
       "The system A f = b of a model's joint constraint forces at one state [sharf1993].\n\n"
-      "A is symmetric positive definite and follows the joints: a block row a joint, as many rows "
+      "A is symmetric positive definite and follows the joints: a block row per joint, as many "
+      "rows "
       "as it constrains directions.")
       .def(nb::init<const PyModel&, nb::handle, nb::handle, nb::handle, nb::handle, bool>(),
            "model"_a, "q"_a, "v"_a = nb::none(), "tau"_a = nb::none(), nb::kw_only(),
@@ -442,7 +443,7 @@ void bind_evaluator(nb::module_& m) {
       .def("follow", &PyEvaluator::follow, "times"_a, "q"_a, "v"_a = nb::none(),
            "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(), "passive"_a = false,
            "time_limit"_a = std::numeric_limits<double>::infinity(),
-           "One evaluation a state (n, ...), all accepted: a dictionary of acceleration (n, nv), "
+           "One evaluation per state (n, ...), all accepted: a dictionary of acceleration (n, nv), "
            "seconds, iterations,\n"
            "error_estimate (n,) and outcome. Shorter when time_limit seconds have passed.")
       .def_prop_ro("constraint_force", &PyEvaluator::constraint_force, nb::rv_policy::move,

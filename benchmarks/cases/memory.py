@@ -1,4 +1,4 @@
-"""Chains of up to a million links: time and memory a link, every engine as far as it goes."""
+"""Chains of up to a million links: time and memory per link, every engine as far as it goes."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@
 //     build/release/benchmarks/cpp/linkwise_crossovers
 //
 // Chains of random hinges by the recursion body by body and in pieces; trees body by body and with
-// their paths in SIMD lanes. Nanoseconds a body, joint loads included, one thread, best of many.
+// their paths in SIMD lanes. Nanoseconds per body, joint loads included, one thread, best of many.
 
 #include <algorithm>
 #include <chrono>

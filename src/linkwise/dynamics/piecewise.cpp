@@ -224,7 +224,7 @@ Piecewise::Piecewise(const Model& model, const DynamicsOptions& options) {
   if (!suits(model))
     throw InputError("method piecewise takes a chain of at least " + std::to_string(min_bodies) +
                      " revolute joints without armature, and model '" + model.spec().name + "'" +
-                     model.where() + " is none; use articulated_body");
+                     model.where() + " is not one; use articulated_body");
   chain_ = std::make_unique<PiecewiseChain>(model, options);
 }
 
