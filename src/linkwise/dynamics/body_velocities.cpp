@@ -24,7 +24,7 @@ BodyVelocities::BodyVelocities(const Model& model, const DynamicsOptions& option
     : model_(&model),
       system_(model),
       solver_(make_solver(solver_name(model, options), options.solver_options)),
-      guess_(make_initial_guess(options.initial_guess, {options.history})),
+      guess_(make_initial_guess(options.initial_guess, options.solver_options.own)),
       f_(system_.A().size()),
       du_(model.nv()),
       v_(model.n_bodies()),

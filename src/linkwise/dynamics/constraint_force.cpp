@@ -19,7 +19,7 @@ ConstraintForce::ConstraintForce(const Model& model, const DynamicsOptions& opti
     : model_(&model),
       system_(model, Executor(checked_threads(options.threads))),
       solver_(make_solver(options.solver, solver_options(options))),
-      guess_(make_initial_guess(options.initial_guess, {options.history})),
+      guess_(make_initial_guess(options.initial_guess, options.solver_options.own)),
       f_(system_.A().size()),
       direct_(find_solver(options.solver).kind == SolverKind::direct) {}
 

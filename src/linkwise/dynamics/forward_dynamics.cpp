@@ -10,6 +10,7 @@
 #include "linkwise/dynamics/joint_space_conjugate_gradient.hpp"
 #include "linkwise/dynamics/piecewise.hpp"
 #include "linkwise/exec/thread_pool.hpp"
+#include "linkwise/solve/direct/direct_solver.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
@@ -82,8 +83,7 @@ std::unique_ptr<DynamicsMethod> make_articulated_body(const Model& model,
 
 std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model,
                                                       const DynamicsOptions& options) {
-  const SolverOptions& asked = options.solver_options;
-  if (options.solver == "thomas" && asked.refinement_steps == 0 && !asked.estimate_error)
+  if (options.solver == "thomas" && !ask_for_refinement(options.solver_options))
     return std::make_unique<FusedConstraintForce>(model);
   return std::make_unique<ConstraintForce>(model, options);
 }
@@ -129,7 +129,7 @@ constexpr int piecewise_from = 64;
 Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
   Choice choice{options.method, options.solver, "as asked for"};
   if (options.solver != "auto") find_solver(options.solver);
-  make_initial_guess(options.initial_guess, {options.history});  // refuses unknown names
+  make_initial_guess(options.initial_guess);  // refuses unknown names
   if (options.method == "auto") {
     if (options.solver != "auto") {
       choice.method = "constraint_force";

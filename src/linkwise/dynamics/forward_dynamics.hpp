@@ -17,7 +17,6 @@ struct DynamicsOptions {
   std::string method = "auto";
   std::string solver = "auto";  ///< for method constraint_force
   std::string initial_guess = "zero";
-  int history = 8;  ///< solutions kept by the guess "projection"
   int threads = 0;  ///< 0: the default of thread_pool.hpp
   SolverOptions solver_options;
 };

@@ -140,6 +140,24 @@ bool ScaledTree::scale_hub(const BlockTree& A, int h) {
   return true;
 }
 
+void ScaledTree::colour(std::vector<int>& colours) const {
+  colours.resize(n());
+  // Joints of one hub get consecutive colours, skipping the inboard joint's.
+  std::vector<int> next(hubs.size(), 0);
+  for (int i = 0; i < n(); ++i) {
+    const int p = parent[i];
+    if (p < 0) {
+      colours[i] = 0;
+    } else if (lever_of[i] < 0) {
+      colours[i] = colours[p] == 0 ? 1 : 0;
+    } else {
+      int& own = next[hub[p]];
+      if (own == colours[p]) ++own;
+      colours[i] = own++;
+    }
+  }
+}
+
 void ScaledTree::scale_right_hand_side(std::span<const double> b, std::span<double> scaled) const {
   for_each_node([&](int i) {
     with_dim(dim[i], [&](auto d) {

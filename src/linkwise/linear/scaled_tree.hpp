@@ -39,6 +39,10 @@ class ScaledTree {
   /// element bound of [wathen1987] (A and D are both sums over the bodies).
   int joints_on_a_body() const { return joints_on_a_body_; }
 
+  /// Colours such that no two coupled nodes share one: red (0) and black (1) along chains; the
+  /// joints of a hub are all coupled, so a hub with k outboard joints needs k + 1.
+  void colour(std::vector<int>& colours) const;
+
   void scale_right_hand_side(std::span<const double> b, std::span<double> scaled) const;
   void scale_solution(std::span<const double> x, std::span<double> scaled) const;
   void unscale_solution(std::span<const double> scaled, std::span<double> x) const;

@@ -117,27 +117,33 @@ class Projection final : public InitialGuess {
   std::vector<std::vector<double>> basis_, image_;
 };
 
+constexpr Option history{.name = "history",
+                         .fallback = 8,
+                         .text = "solutions kept",
+                         .accepts = at_least_one,
+                         .wanted = "give 1 or more"};
+std::span<const Option> projection_options() { return {&history, 1}; }
+
 constexpr std::array<InitialGuessEntry, 5> table{{
     {"zero", "start from zero; the solution depends on time and state alone", "sharf1993",
-     [](const InitialGuessOptions&) -> std::unique_ptr<InitialGuess> {
-       return std::make_unique<Zero>();
-     }},
+     [](const OptionValues&) -> std::unique_ptr<InitialGuess> { return std::make_unique<Zero>(); }},
     {"previous", "the last accepted solution", "sharf1993",
-     [](const InitialGuessOptions&) -> std::unique_ptr<InitialGuess> {
+     [](const OptionValues&) -> std::unique_ptr<InitialGuess> {
        return std::make_unique<Polynomial>(0);
      }},
     {"linear", "the line through the last two accepted solutions", "sharf1993",
-     [](const InitialGuessOptions&) -> std::unique_ptr<InitialGuess> {
+     [](const OptionValues&) -> std::unique_ptr<InitialGuess> {
        return std::make_unique<Polynomial>(1);
      }},
     {"cubic", "the cubic through the last four accepted solutions", "sharf1993",
-     [](const InitialGuessOptions&) -> std::unique_ptr<InitialGuess> {
+     [](const OptionValues&) -> std::unique_ptr<InitialGuess> {
        return std::make_unique<Polynomial>(3);
      }},
     {"projection", "the best combination of the last solutions in the energy norm", "fischer1998",
-     [](const InitialGuessOptions& options) -> std::unique_ptr<InitialGuess> {
-       return std::make_unique<Projection>(options.history);
-     }},
+     [](const OptionValues& options) -> std::unique_ptr<InitialGuess> {
+       return std::make_unique<Projection>(options.count(history));
+     },
+     projection_options},
 }};
 
 }  // namespace
@@ -145,10 +151,7 @@ constexpr std::array<InitialGuessEntry, 5> table{{
 std::span<const InitialGuessEntry> initial_guess_table() { return table; }
 
 std::unique_ptr<InitialGuess> make_initial_guess(std::string_view name,
-                                                 const InitialGuessOptions& options) {
-  if (options.history < 1)
-    throw InputError("initial guess: history is " + std::to_string(options.history) +
-                     "; give 1 or more");
+                                                 const OptionValues& options) {
   std::string known;
   for (const InitialGuessEntry& entry : table) {
     if (entry.name == name) return entry.make(options);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "linkwise/linear/block_tree.hpp"
+#include "linkwise/solve/options.hpp"
 
 namespace linkwise {
 
@@ -49,20 +50,17 @@ class InitialGuess {
   bool has_current_ = false;
 };
 
-struct InitialGuessOptions {
-  int history = 8;  ///< projection: the number of solutions kept, at least 1
-};
-
 struct InitialGuessEntry {
   std::string_view name;
   std::string_view description;
   std::string_view reference;  ///< key in references.bib
-  std::unique_ptr<InitialGuess> (*make)(const InitialGuessOptions&);
+  std::unique_ptr<InitialGuess> (*make)(const OptionValues&);
+  OptionList* options = no_options;
 };
 
 std::span<const InitialGuessEntry> initial_guess_table();
-/// InputError, listing the known names, when the name is unknown; or when history < 1.
+/// InputError, listing the known names, when the name is unknown.
 std::unique_ptr<InitialGuess> make_initial_guess(std::string_view name,
-                                                 const InitialGuessOptions& options = {});
+                                                 const OptionValues& options = {});
 
 }  // namespace linkwise

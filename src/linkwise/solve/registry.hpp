@@ -1,10 +1,12 @@
 #pragma once
-// The table of linear solvers. One line of it gives a solver its place in C++, Python, the command
+// The table of linear solvers. One row of it gives a solver its place in C++, Python, the command
 // line, the documentation, the contract tests and the benchmarks.
 
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "linkwise/solve/solver.hpp"
 
@@ -22,11 +24,23 @@ struct SolverEntry {
   bool parallel;               ///< can all nodes work at once, up to sums and short recursions?
   std::string_view reference;  ///< key in references.bib
   std::unique_ptr<LinearSolver> (*make)(const SolverOptions&);
+  OptionList* options = no_options;  ///< its own, besides common_options()
 };
 
 std::span<const SolverEntry> solver_table();
 /// InputError, listing the known names, when the name is unknown.
 const SolverEntry& find_solver(std::string_view name);
+/// An option as users know it.
+struct SolverOption {
+  const Option* option;
+  std::string owners;  ///< the solvers or guesses that have it, by name; empty: all solvers
+};
+
+/// Every option of every solver and initial guess, each name once.
+std::vector<SolverOption> solver_options();
+/// InputError, listing the known names, when the name is unknown.
+const Option& find_option(std::string_view name);
+
 /// Checks the name and the options.
 std::unique_ptr<LinearSolver> make_solver(std::string_view name, const SolverOptions& options = {});
 

@@ -1,87 +1,73 @@
 #include "linkwise/solve/solver.hpp"
 
-#include <array>
-#include <cmath>
-#include <cstdio>
 #include <utility>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
 namespace {
 
-template <class Enum, std::size_t count>
-using NameTable = std::array<std::pair<Enum, std::string_view>, count>;
+/// In the order of the enum.
+constexpr std::string_view stop_rules[] = {"paper", "residual", "energy_norm"};
 
-constexpr NameTable<StopRule, 3> stop_rules{{{StopRule::paper, "paper"},
-                                             {StopRule::residual, "residual"},
-                                             {StopRule::energy_norm, "energy_norm"}}};
+bool positive(double x) { return x > 0.0; }
 
-constexpr NameTable<ConjugateGradientForm, 2> forms{
-    {{ConjugateGradientForm::two_term, "two_term"},
-     {ConjugateGradientForm::three_term, "three_term"}}};
-
-constexpr NameTable<RelaxationChoice, 3> relaxations{{{RelaxationChoice::optimal, "optimal"},
-                                                      {RelaxationChoice::given, "given"},
-                                                      {RelaxationChoice::adaptive, "adaptive"}}};
-
-template <class Enum, std::size_t count>
-Enum from_name(const NameTable<Enum, count>& table, std::string_view what, std::string_view name) {
-  for (const auto& [value, known] : table)
-    if (known == name) return value;
-  std::string text = "unknown " + std::string(what) + " '" + std::string(name) + "'; known are";
-  for (std::size_t i = 0; i < count; ++i) text += (i ? ", " : " ") + std::string(table[i].second);
-  throw InputError(text);
-}
-
-template <class Enum, std::size_t count>
-std::string_view to_name(const NameTable<Enum, count>& table, Enum value) {
-  for (const auto& [known, name] : table)
-    if (known == value) return name;
-  return "?";
-}
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
-}
+constexpr Option common[] = {
+    {.name = "tolerance",
+     .fallback = 1e-7,
+     .text = "what the stop rule compares with",
+     .accepts = positive,
+     .wanted = "give a number above 0"},
+    {.name = "absolute_tolerance",
+     .fallback = 0.0,
+     .text = "added to the bound of stop rule energy_norm, sqrt(J)/s",
+     .accepts = at_least_zero,
+     .wanted = "give 0 or more"},
+    {.name = "max_iterations",
+     .fallback = 0,
+     .text = "most iterations of a solution; 0: the solver's own limit",
+     .accepts = at_least_zero,
+     .wanted = "give 1 or more, or 0 for the solver's own limit"},
+    {.name = "stop",
+     .fallback = std::string_view("energy_norm"),
+     .text = "stop rule: paper, residual or energy_norm"},
+};
 
 }  // namespace
 
-std::string_view to_string(StopRule rule) { return to_name(stop_rules, rule); }
+std::string_view to_string(StopRule rule) { return stop_rules[static_cast<int>(rule)]; }
+
 StopRule stop_rule_from_name(std::string_view name) {
-  return from_name(stop_rules, "stop rule", name);
+  std::string known;
+  for (StopRule rule : {StopRule::paper, StopRule::residual, StopRule::energy_norm}) {
+    if (to_string(rule) == name) return rule;
+    known += (known.empty() ? " " : ", ") + std::string(to_string(rule));
+  }
+  throw InputError("unknown stop rule '" + std::string(name) + "'; known are" + known);
 }
-std::string_view to_string(ConjugateGradientForm form) { return to_name(forms, form); }
-ConjugateGradientForm conjugate_gradient_form_from_name(std::string_view name) {
-  return from_name(forms, "form of conjugate gradients", name);
-}
-std::string_view to_string(RelaxationChoice choice) { return to_name(relaxations, choice); }
-RelaxationChoice relaxation_choice_from_name(std::string_view name) {
-  return from_name(relaxations, "choice of the relaxation factor", name);
+
+std::span<const Option> common_options() { return common; }
+
+void SolverOptions::set(std::string_view name, OptionValue value) {
+  const Option& option = find_option(name);
+  value = checked(option, std::move(value));
+  if (name == "tolerance")
+    tolerance = std::get<double>(value);
+  else if (name == "absolute_tolerance")
+    absolute_tolerance = std::get<double>(value);
+  else if (name == "max_iterations")
+    max_iterations = std::get<int>(value);
+  else if (name == "stop")
+    stop = stop_rule_from_name(std::get<std::string>(value));
+  else
+    own.set(option, std::move(value));
 }
 
 void validate(const SolverOptions& o) {
-  const auto reject = [](const std::string& text) { throw InputError("solver options: " + text); };
-  if (!(o.tolerance > 0.0) || !std::isfinite(o.tolerance))
-    reject("tolerance is " + number(o.tolerance) + "; give a number above 0");
-  if (!(o.absolute_tolerance >= 0.0) || !std::isfinite(o.absolute_tolerance))
-    reject("absolute_tolerance is " + number(o.absolute_tolerance) + "; give 0 or more");
-  if (o.max_iterations < 0)
-    reject("max_iterations is " + std::to_string(o.max_iterations) +
-           "; give 1 or more, or 0 for the solver's own limit");
-  if (!(o.omega > 0.0 && o.omega < 2.0))
-    reject("omega is " + number(o.omega) + "; over-relaxation converges for 0 < omega < 2 only");
-  if (!(o.spectral_radius >= 0.0 && o.spectral_radius < 1.0))
-    reject("spectral_radius is " + number(o.spectral_radius) +
-           "; give a number in (0, 1), or 0 to have it estimated");
-  if (o.block_size < 0)
-    reject("block_size is " + std::to_string(o.block_size) +
-           "; give 1 or more, or 0 for the solver's default");
-  if (o.refinement_steps < 0)
-    reject("refinement_steps is " + std::to_string(o.refinement_steps) + "; give 0 or more");
-  if (o.lag_limit < 1) reject("lag_limit is " + std::to_string(o.lag_limit) + "; give 1 or more");
+  checked(common[0], o.tolerance);
+  checked(common[1], o.absolute_tolerance);
+  checked(common[2], o.max_iterations);
 }
 
 void accumulate(Report& total, const Report& one) {

@@ -9,6 +9,7 @@
 #include "linkwise/base/outcome.hpp"
 #include "linkwise/exec/executor.hpp"
 #include "linkwise/linear/block_tree.hpp"
+#include "linkwise/solve/options.hpp"
 
 namespace linkwise {
 
@@ -22,25 +23,6 @@ enum class StopRule {
 std::string_view to_string(StopRule rule);
 /// InputError, listing the known names, when the name is unknown.
 StopRule stop_rule_from_name(std::string_view name);
-
-/// The two equivalent recurrences of conjugate gradients.
-enum class ConjugateGradientForm {
-  two_term,    ///< the usual one
-  three_term,  ///< the paper's Table 1
-};
-
-std::string_view to_string(ConjugateGradientForm form);
-ConjugateGradientForm conjugate_gradient_form_from_name(std::string_view name);
-
-/// How successive over-relaxation gets its factor.
-enum class RelaxationChoice {
-  optimal,   ///< 2 / (1 + sqrt(1 - mu^2)), mu = spectral radius of 1 - D^-1 A
-  given,     ///< SolverOptions::omega
-  adaptive,  ///< found on the way [hageman1981, chapter 9]
-};
-
-std::string_view to_string(RelaxationChoice choice);
-RelaxationChoice relaxation_choice_from_name(std::string_view name);
 
 /// What the energy-norm rule allows: ||x* - x||_A <= relative ||x*||_A + absolute.
 struct EnergyBound {
@@ -61,25 +43,19 @@ struct SolverOptions {
   /// 0: chosen by the solver from the number of unknowns.
   int max_iterations = 0;
   StopRule stop = StopRule::energy_norm;
-  ConjugateGradientForm form = ConjugateGradientForm::two_term;
-  RelaxationChoice relaxation = RelaxationChoice::optimal;
-  /// Over-relaxation factor in (0, 2); read when relaxation is `given`.
-  double omega = 1.0;
-  /// Spectral radius of 1 - D^-1 A, in (0, 1), for sor and chebyshev; 0: estimated by Lanczos.
-  double spectral_radius = 0.0;
-  /// Joints in a block of block_schwarz_conjugate_gradient and two_level; 0: the solver's default.
-  int block_size = 0;
-  /// Steps of iterative refinement after a direct solve.
-  int refinement_steps = 0;
-  /// Direct solvers: estimate the error (a product and a further solve); otherwise it is NaN.
-  bool estimate_error = false;
-  /// lagged_thomas: how many iterations a solve may take before the factor is renewed.
-  int lag_limit = 8;
+  /// Options of single solvers, see set().
+  OptionValues own;
   /// Who shares an iteration's products and sums; it influences no result.
   Executor executor;
 
+  /// Sets an option by the name that users give it, one of solver_options(). InputError when the
+  /// name is unknown, or the value of another type or out of range.
+  void set(std::string_view name, OptionValue value);
   bool operator==(const SolverOptions&) const = default;
 };
+
+/// The options that every solver has, by name.
+std::span<const Option> common_options();
 
 /// Throws InputError that names the option when one is out of range.
 void validate(const SolverOptions& options);

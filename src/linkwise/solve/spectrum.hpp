@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "linkwise/linear/scaled_tree.hpp"
+#include "linkwise/solve/options.hpp"
 
 namespace linkwise {
 
@@ -29,6 +30,14 @@ struct Spectrum {
 /// 2 / (1 + sqrt(1 - mu^2)), mu = 1 - smallest eigenvalue of D^-1 A [hageman1981, chapter 9],
 /// written so that no digits cancel when mu is near 1.
 double optimal_relaxation(double smallest_eigenvalue);
+
+/// Of the solvers that need an eigenvalue.
+inline constexpr Option spectral_radius_option{
+    .name = "spectral_radius",
+    .fallback = 0.0,
+    .text = "of 1 - D^-1 A, in (0, 1); 0: estimated",
+    .accepts = [](double x) { return x >= 0.0 && x < 1.0; },
+    .wanted = "give a number in (0, 1), or 0 to have it estimated"};
 
 /// Keeps its memory between calls.
 class SpectrumEstimator {

@@ -42,7 +42,7 @@ TEST(Allocation, NoneAfterTheFirstSolve) {
       std::vector<double> x(b.size(), 0.0);
       SolverOptions options;
       options.tolerance = 1e-4;
-      options.estimate_error = true;
+      options.set("estimate_error", true);
       options.max_iterations = 500;
       const auto solver = entry.make(options);
       solver->solve(tree, b, x);
@@ -61,8 +61,10 @@ TEST(Allocation, NoneInAGuessOnceItsHistoryIsFull) {
   const BlockTree tree = random_tree(Shape::bushy_tree, Dims::mixed, 20, 3);
   const std::vector<double> b = random_vector(tree.size(), 1);
   std::vector<double> x(b.size());
+  SolverOptions options;
+  options.set("history", 4);
   for (const InitialGuessEntry& entry : initial_guess_table()) {
-    const auto guess = entry.make({.history = 4});
+    const auto guess = entry.make(options.own);
     long before = 0;
     for (int step = 0; step < 12; ++step) {
       if (step == 6) before = allocations;

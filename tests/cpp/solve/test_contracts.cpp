@@ -60,7 +60,7 @@ TEST_P(EverySolver, SolvesToItsTolerance) {
         for (double tolerance : {1e-4, 1e-10}) {
           SolverOptions options;
           options.tolerance = tolerance;
-          options.estimate_error = true;
+          options.set("estimate_error", true);
           const auto solver = entry().make(options);
           std::vector<double> x(b.size(), 0.0);
           const Report report = solver->solve(tree, b, x);

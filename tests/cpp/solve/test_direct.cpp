@@ -5,7 +5,6 @@
 #include "linear/block_tree_scenes.hpp"
 #include "linear/dense_twin.hpp"
 #include "linkwise/linear/residual.hpp"
-#include "linkwise/solve/direct/thomas.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise::testing {
@@ -22,7 +21,7 @@ TEST(DirectSolvers, ErrorEstimateIsHonest) {
     const std::vector<double> exact = cholesky_solve(dense, b);
     for (const char* name : {"thomas", "twisted", "cyclic_reduction"}) {
       SolverOptions options;
-      options.estimate_error = true;
+      options.set("estimate_error", true);
       std::vector<double> x(tree.size());
       const Report report = make_solver(name, options)->solve(tree, b, x);
       ASSERT_TRUE(report.ok());
@@ -41,7 +40,7 @@ TEST(DirectSolvers, RefinementRecoversTheDigitsLost) {
   const std::vector<double> exact = cholesky_solve(dense, b);
   const auto error = [&](int steps) {
     SolverOptions options;
-    options.refinement_steps = steps;
+    options.set("refinement_steps", steps);
     std::vector<double> x(tree.size());
     EXPECT_TRUE(make_solver("thomas", options)->solve(tree, b, x).ok());
     return energy_error(dense, x, exact);

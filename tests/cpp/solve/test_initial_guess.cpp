@@ -5,6 +5,7 @@
 #include "linear/block_tree_scenes.hpp"
 #include "linear/dense_twin.hpp"
 #include "linkwise/solve/initial_guess.hpp"
+#include "linkwise/solve/solver.hpp"
 
 namespace linkwise::testing {
 namespace {
@@ -83,7 +84,9 @@ TEST(InitialGuess, AnotherSizeStartsAfresh) {
 TEST(InitialGuess, ProjectionFindsWhatTheHistorySpans) {
   const BlockTree tree = random_tree(Shape::bushy_tree, Dims::mixed, 12, 3);
   const Dense dense = dense_twin(tree);
-  const auto projection = make_initial_guess("projection", {.history = 3});
+  SolverOptions options;
+  options.set("history", 3);
+  const auto projection = make_initial_guess("projection", options.own);
   std::vector<std::vector<double>> stored;
   for (int k = 0; k < 3; ++k) {
     stored.push_back(random_vector(tree.size(), 20 + k));

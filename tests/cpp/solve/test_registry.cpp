@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "linear/block_tree_scenes.hpp"
 #include "linkwise/base/error.hpp"
 #include "linkwise/solve/initial_guess.hpp"
 #include "linkwise/solve/registry.hpp"
@@ -47,21 +48,17 @@ TEST(Registry, UnknownNamesListTheKnownOnes) {
     EXPECT_NE(guess.find(entry.name), std::string::npos) << entry.name;
   EXPECT_EQ(complaint([] { stop_rule_from_name("energy"); }),
             "unknown stop rule 'energy'; known are paper, residual, energy_norm");
-  EXPECT_EQ(complaint([] { conjugate_gradient_form_from_name("four_term"); }),
-            "unknown form of conjugate gradients 'four_term'; known are two_term, three_term");
-  EXPECT_EQ(complaint([] { relaxation_choice_from_name("best"); }),
-            "unknown choice of the relaxation factor 'best'; known are optimal, given, adaptive");
+  EXPECT_EQ(complaint([] { SolverOptions().set("form", "four_term"); }),
+            "solver options: form is 'four_term'; known are two_term, three_term");
+  const std::string option = complaint([] { SolverOptions().set("omga", 1.0); });
+  EXPECT_NE(option.find("unknown key 'omga'; known: tolerance, "), std::string::npos) << option;
+  for (const SolverOption& known : solver_options())
+    EXPECT_NE(option.find(known.option->name), std::string::npos) << option;
 }
 
 TEST(Registry, NamesAndValuesAreInverse) {
   for (StopRule rule : {StopRule::paper, StopRule::residual, StopRule::energy_norm})
     EXPECT_EQ(stop_rule_from_name(to_string(rule)), rule);
-  for (RelaxationChoice choice :
-       {RelaxationChoice::optimal, RelaxationChoice::given, RelaxationChoice::adaptive})
-    EXPECT_EQ(relaxation_choice_from_name(to_string(choice)), choice);
-  for (ConjugateGradientForm form :
-       {ConjugateGradientForm::two_term, ConjugateGradientForm::three_term})
-    EXPECT_EQ(conjugate_gradient_form_from_name(to_string(form)), form);
 }
 
 TEST(Registry, OptionsOutOfRangeAreRejectedByName) {
@@ -77,15 +74,44 @@ TEST(Registry, OptionsOutOfRangeAreRejectedByName) {
     rejects("tolerance", [=](SolverOptions& o) { o.tolerance = value; });
   for (double value : {-1.0, nan})
     rejects("absolute_tolerance", [=](SolverOptions& o) { o.absolute_tolerance = value; });
-  for (double value : {0.0, 2.0, -0.5, 2.5, nan})
-    rejects("omega", [=](SolverOptions& o) { o.omega = value; });
-  for (double value : {1.0, -0.1, nan})
-    rejects("spectral_radius", [=](SolverOptions& o) { o.spectral_radius = value; });
   rejects("max_iterations", [](SolverOptions& o) { o.max_iterations = -1; });
-  rejects("block_size", [](SolverOptions& o) { o.block_size = -2; });
-  rejects("refinement_steps", [](SolverOptions& o) { o.refinement_steps = -1; });
-  rejects("lag_limit", [](SolverOptions& o) { o.lag_limit = 0; });
-  EXPECT_NE(complaint([] { make_initial_guess("projection", {.history = 0}); }), "(nothing)");
+  for (double value : {0.0, 2.0, -0.5, 2.5, nan})
+    rejects("omega", [=](SolverOptions& o) { o.set("omega", value); });
+  for (double value : {1.0, -0.1, nan})
+    rejects("spectral_radius", [=](SolverOptions& o) { o.set("spectral_radius", value); });
+  for (const char* name : {"max_iterations", "block_size", "refinement_steps"})
+    rejects(name, [=](SolverOptions& o) { o.set(name, -1); });
+  for (const char* name : {"lag_limit", "history"})
+    rejects(name, [=](SolverOptions& o) { o.set(name, 0); });
+}
+
+TEST(Registry, OptionsOfAnotherTypeAreRejectedByName) {
+  const auto text = [](const char* name, OptionValue value) {
+    return complaint([&] { SolverOptions().set(name, value); });
+  };
+  EXPECT_EQ(text("omega", true), "solver options: omega is true; give a number");
+  EXPECT_EQ(text("block_size", 1.5), "solver options: block_size is 1.5; give a whole number");
+  EXPECT_EQ(text("estimate_error", 1), "solver options: estimate_error is 1; give True or False");
+  EXPECT_EQ(text("form", 2), "solver options: form is 2; give a name in quotes");
+  EXPECT_EQ(text("omega", 1), "(nothing)");  // a whole number is a number
+}
+
+TEST(Registry, RowsThatFixAnOptionTakeNoOther) {
+  const BlockTree tree = random_tree(Shape::chain, Dims::five, 20, 3);
+  const std::vector<double> b = random_vector(tree.size(), 4);
+  const auto solve = [&](const char* name, const SolverOptions& options) {
+    std::vector<double> x(b.size(), 0.0);
+    make_solver(name, options)->solve(tree, b, x);
+    return x;
+  };
+  SolverOptions plain, relaxed, coloured;
+  relaxed.set("omega", 1.3);
+  coloured.set("order", "red_black");
+  EXPECT_EQ(solve("gauss_seidel", relaxed), solve("gauss_seidel", plain));
+  EXPECT_EQ(solve("sor", coloured), solve("red_black_sor", plain));
+  EXPECT_NE(solve("sor", relaxed), solve("sor", plain));
+  coloured.set("omega", 1.0);
+  EXPECT_EQ(solve("sor", coloured), solve("red_black_gauss_seidel", relaxed));
 }
 
 }  // namespace

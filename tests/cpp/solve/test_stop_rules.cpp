@@ -168,7 +168,7 @@ TEST(Outcomes, IndefiniteBeyondTheDiagonalBlocks) {
         << name;
   }
   SolverOptions three_term;
-  three_term.form = ConjugateGradientForm::three_term;
+  three_term.set("form", "three_term");
   std::vector<double> x(tree.size(), 0.0);
   EXPECT_EQ(make_solver("conjugate_gradient", three_term)
                 ->solve(tree, random_vector(tree.size(), 1), x)

@@ -20,7 +20,7 @@ TEST_P(SolverThreads, SameBits) {
     const auto solve = [&](int threads) {
       SolverOptions options;
       options.max_iterations = 12;
-      options.spectral_radius = 0.9;  // else found by hundreds of products
+      options.set("spectral_radius", 0.9);  // else found by hundreds of products
       options.executor = Executor(threads);
       std::vector<double> x(b.size(), 0.0);
       make_solver(GetParam().name, options)->solve(tree, b, x);

@@ -32,8 +32,8 @@ TEST_P(TwoLevelChains, AtMostTwentyIterations) {
     const BlockTree tree = rod_chain(chain);
     const std::vector<double> b = random_vector(tree.size(), 5);
     SolverOptions refined, options;
-    refined.refinement_steps = 4;
-    refined.estimate_error = true;
+    refined.set("refinement_steps", 4);
+    refined.set("estimate_error", true);
     std::vector<double> reference(b.size()), x(b.size(), 0.0);
     const Report exact = make_solver("thomas", refined)->solve(tree, b, reference);
     options.tolerance = 1e-10;
@@ -60,7 +60,7 @@ TEST(TwoLevel, IterationsDoNotGrowWithTheNumberOfPieces) {
     const BlockTree tree = rod_chain(chain);
     std::vector<double> x(tree.size(), 0.0);
     SolverOptions options;
-    options.block_size = block_size;
+    options.set("block_size", block_size);
     return make_solver("two_level", options)
         ->solve(tree, random_vector(tree.size(), 5), x)
         .iterations;

@@ -4,11 +4,36 @@
 // and the eliminations of one level are independent. After log2 N levels one node is left.
 // About 2.7 times the work of block Thomas, in log N instead of N steps.
 
-#include "linkwise/solve/direct/cyclic_reduction.hpp"
-
 #include <algorithm>
+#include <vector>
+
+#include "linkwise/linear/ldlt.hpp"
+#include "linkwise/solve/direct/chain_order.hpp"
+#include "linkwise/solve/direct/direct_solver.hpp"
 
 namespace linkwise {
+namespace {
+
+class CyclicReduction final : public DirectSolver {
+ public:
+  explicit CyclicReduction(const SolverOptions& options) : DirectSolver(options) {}
+
+ private:
+  struct Node {
+    PackedLower lower;  ///< the pivot block, then its L and 1 / D
+    Block coupling;     ///< to the nearest remaining node towards the base, padded with zeros
+    Block base, tip;    ///< L^-1 times the couplings to both neighbours when it was eliminated
+  };
+
+  int factor_matrix(const BlockTree& A) override;
+  void solve_in_place(const BlockTree& A, std::span<double> x) override;
+  bool eliminate(const BlockTree& A, int base, int i, int tip);
+  void forward(const BlockTree& A, int base, int i, int tip, double* x) const;
+  void backward(const BlockTree& A, int base, int i, int tip, double* x) const;
+
+  ChainOrder order_;
+  std::vector<Node> nodes_;
+};
 
 bool CyclicReduction::eliminate(const BlockTree& A, int base, int i, int tip) {
   Node& node = nodes_[i];
@@ -107,6 +132,8 @@ void CyclicReduction::solve_in_place(const BlockTree& A, std::span<double> x) {
         backward(A, at[k - stride], at[k], k + stride < length ? at[k + stride] : -1, x.data());
   }
 }
+
+}  // namespace
 
 std::unique_ptr<LinearSolver> make_cyclic_reduction(const SolverOptions& options) {
   return std::make_unique<CyclicReduction>(options);

@@ -14,6 +14,31 @@
 #include "linkwise/linear/vector.hpp"
 
 namespace linkwise {
+namespace {
+
+constexpr Option rows[] = {{.name = "refinement_steps",
+                            .fallback = 0,
+                            .text = "steps of iterative refinement",
+                            .accepts = at_least_zero,
+                            .wanted = "give 0 or more"},
+                           {.name = "estimate_error",
+                            .fallback = false,
+                            .text = "estimate the error, at the cost of a product and a solve; "
+                                    "otherwise it is NaN"}};
+constexpr const Option &steps = rows[0], &estimate = rows[1];
+
+}  // namespace
+
+std::span<const Option> direct_options() { return rows; }
+
+bool ask_for_refinement(const SolverOptions& o) {
+  return o.own.count(steps) > 0 || o.own.flag(estimate);
+}
+
+DirectSolver::DirectSolver(const SolverOptions& o)
+    : LinearSolver(o),
+      refinement_steps_(o.own.count(steps)),
+      estimate_error_(o.own.flag(estimate)) {}
 
 Report DirectSolver::factor(const BlockTree& A) {
   Report report;
@@ -29,7 +54,7 @@ Report DirectSolver::solve_factored(const BlockTree& A, std::span<const double> 
   std::copy(b.begin(), b.end(), x.begin());
   solve_in_place(A, x);
   Report report;
-  if (options_.refinement_steps > 0 || options_.estimate_error)
+  if (refinement_steps_ > 0 || estimate_error_)
     report = refine(A, b, x);
   else
     report.error_estimate = std::numeric_limits<double>::quiet_NaN();
@@ -41,7 +66,7 @@ Report DirectSolver::refine(const BlockTree& A, std::span<const double> b, std::
   residual_.resize(x.size());
   correction_.resize(x.size());
   Report report;
-  for (int step = 0; step <= options_.refinement_steps; ++step) {
+  for (int step = 0; step <= refinement_steps_; ++step) {
     accurate_residual(A, b, x, residual_);
     std::copy(residual_.begin(), residual_.end(), correction_.begin());
     solve_in_place(A, correction_);
@@ -49,9 +74,9 @@ Report DirectSolver::refine(const BlockTree& A, std::span<const double> b, std::
     const double scale = std::sqrt(std::max(0.0, dot(x, b)));
     report.error_estimate =
         std::max(scale > 0.0 ? error / scale : error, std::numeric_limits<double>::epsilon());
-    if (step < options_.refinement_steps) add_scaled(1.0, correction_, x);
+    if (step < refinement_steps_) add_scaled(1.0, correction_, x);
   }
-  report.iterations = options_.refinement_steps;
+  report.iterations = refinement_steps_;
   return report;
 }
 

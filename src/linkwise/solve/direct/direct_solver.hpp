@@ -15,12 +15,8 @@ class DirectSolver : public LinearSolver {
   Report solve_many(const BlockTree& A, int count, std::span<const double> b,
                     std::span<double> x) final;
 
-  /// The two halves of solve(), for right-hand sides that become known later.
-  Report factor(const BlockTree& A);
-  Report solve_factored(const BlockTree& A, std::span<const double> b, std::span<double> x);
-
  protected:
-  explicit DirectSolver(const SolverOptions& options) : LinearSolver(options) {}
+  explicit DirectSolver(const SolverOptions& options);
 
   /// Factors A; the node at which that fails, or -1.
   virtual int factor_matrix(const BlockTree& A) = 0;
@@ -28,9 +24,16 @@ class DirectSolver : public LinearSolver {
   virtual void solve_in_place(const BlockTree& A, std::span<double> x) = 0;
 
  private:
+  Report factor(const BlockTree& A);
+  Report solve_factored(const BlockTree& A, std::span<const double> b, std::span<double> x);
   Report refine(const BlockTree& A, std::span<const double> b, std::span<double> x);
 
+  int refinement_steps_;
+  bool estimate_error_;
   std::vector<double> residual_, correction_;
 };
+
+/// Do the options ask for more than a factorisation and a solve?
+bool ask_for_refinement(const SolverOptions& options);
 
 }  // namespace linkwise

@@ -1,15 +1,27 @@
-// Block Thomas algorithm: A x = b by elimination leaf to root and back. See tree_factor.cpp.
+// Block Thomas algorithm: block L D L^T along the chain, leaf to root on a tree, hubs in O(outboard
+// joints). See tree_factor.cpp.
 
-#include "linkwise/solve/direct/thomas.hpp"
+#include "linkwise/solve/direct/direct_solver.hpp"
+#include "linkwise/solve/direct/tree_factor.hpp"
 
 namespace linkwise {
+namespace {
 
-int Thomas::factor_matrix(const BlockTree& A) {
-  factor_.factor(A);
-  return factor_.failed_node();
-}
+class Thomas final : public DirectSolver {
+ public:
+  explicit Thomas(const SolverOptions& options) : DirectSolver(options) {}
 
-void Thomas::solve_in_place(const BlockTree&, std::span<double> x) { factor_.solve_in_place(x); }
+ private:
+  int factor_matrix(const BlockTree& A) override {
+    factor_.factor(A);
+    return factor_.failed_node();
+  }
+  void solve_in_place(const BlockTree&, std::span<double> x) override { factor_.solve_in_place(x); }
+
+  TreeFactor factor_;
+};
+
+}  // namespace
 
 std::unique_ptr<LinearSolver> make_thomas(const SolverOptions& options) {
   return std::make_unique<Thomas>(options);

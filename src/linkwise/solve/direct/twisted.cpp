@@ -3,11 +3,35 @@
 // two are independent of each other: two threads, or the two halves of one core's pipeline, run
 // them at once.
 
-#include "linkwise/solve/direct/twisted.hpp"
-
 #include <algorithm>
+#include <vector>
+
+#include "linkwise/linear/ldlt.hpp"
+#include "linkwise/solve/direct/chain_order.hpp"
+#include "linkwise/solve/direct/direct_solver.hpp"
 
 namespace linkwise {
+namespace {
+
+class Twisted final : public DirectSolver {
+ public:
+  explicit Twisted(const SolverOptions& options) : DirectSolver(options) {}
+
+ private:
+  struct Node {
+    PackedLower lower;  ///< L and 1 / D of the pivot block
+    Block coupling;     ///< L^-1 A_ij, j the neighbour towards the middle
+  };
+
+  int factor_matrix(const BlockTree& A) override;
+  void solve_in_place(const BlockTree& A, std::span<double> x) override;
+  bool eliminate(const BlockTree& A, int i, int into);
+  void forward(const BlockTree& A, int i, int into, double* x) const;
+  void backward(const BlockTree& A, int i, int from, double* x) const;
+
+  ChainOrder order_;
+  std::vector<Node> nodes_;
+};
 
 /// Eliminates node i, whose pivot is complete, into its neighbour's pivot.
 bool Twisted::eliminate(const BlockTree& A, int i, int into) {
@@ -88,6 +112,8 @@ void Twisted::solve_in_place(const BlockTree& A, std::span<double> x) {
     }
   }
 }
+
+}  // namespace
 
 std::unique_ptr<LinearSolver> make_twisted(const SolverOptions& options) {
   return std::make_unique<Twisted>(options);

@@ -6,8 +6,6 @@
 // spectral radius of Jacobi's iteration, the paper's form; a hub can have c > 2, where Jacobi
 // itself diverges.
 
-#include "linkwise/solve/iterative/chebyshev.hpp"
-
 #include <algorithm>
 #include <cmath>
 
@@ -21,14 +19,15 @@ namespace {
 class Chebyshev final : public IterativeSolver {
  public:
   explicit Chebyshev(const SolverOptions& options)
-      : IterativeSolver(options, Coordinates::block_scaled) {}
+      : IterativeSolver(options, Coordinates::block_scaled),
+        spectral_radius_(options.own.number(spectral_radius_option)) {}
 
  private:
   int default_max_iterations(int) const override { return 20000; }
 
   Outcome prepare(const BlockTree&) override {
-    double low = 1.0 - options_.spectral_radius, high = 1.0 + options_.spectral_radius;
-    if (options_.spectral_radius == 0.0) {
+    double low = 1.0 - spectral_radius_, high = 1.0 + spectral_radius_;
+    if (spectral_radius_ == 0.0) {
       const Spectrum spectrum = estimator_.estimate(scaled());
       low = spectrum.smallest;
       high = spectrum.largest;
@@ -44,6 +43,7 @@ class Chebyshev final : public IterativeSolver {
   void iterate(std::span<const double> b, std::span<double> x, StopTest& stop) override;
   double calc_squared_error(double change_square);
 
+  double spectral_radius_;  ///< 0: estimated
   SpectrumEstimator estimator_;
   double step_ = 1.0, radius_ = 0.0, contraction_ = 0.0, smallest_ = 1.0;
   double last_changes_[3] = {};
@@ -101,6 +101,8 @@ void Chebyshev::iterate(std::span<const double> b, std::span<double> x, StopTest
 }
 
 }  // namespace
+
+std::span<const Option> chebyshev_options() { return {&spectral_radius_option, 1}; }
 
 std::unique_ptr<LinearSolver> make_chebyshev(const SolverOptions& options) {
   return std::make_unique<Chebyshev>(options);

@@ -7,8 +7,6 @@
 // with (z, A z) where the printed table has (z, z). Both forms give the same iterates; the two-term
 // form needs one vector update less and rounds a little better.
 
-#include "linkwise/solve/iterative/conjugate_gradient.hpp"
-
 #include <algorithm>
 
 #include "linkwise/solve/iterative/iterative_solver.hpp"
@@ -17,15 +15,21 @@
 namespace linkwise {
 namespace {
 
+constexpr Option form{.name = "form",
+                      .fallback = std::string_view("two_term"),
+                      .text = "two_term, or three_term as in Table 1 of [sharf1993]",
+                      .choices = "two_term, three_term"};
+
 class ConjugateGradient final : public IterativeSolver {
  public:
   explicit ConjugateGradient(const SolverOptions& options)
-      : IterativeSolver(options, Coordinates::block_scaled) {}
+      : IterativeSolver(options, Coordinates::block_scaled),
+        three_term_(options.own.is(form, "three_term")) {}
 
  private:
   void iterate(std::span<const double> b, std::span<double> x, StopTest& stop) override {
     const auto product = [this](std::span<const double> v, std::span<double> w) { multiply(v, w); };
-    if (options_.form == ConjugateGradientForm::three_term)
+    if (three_term_)
       three_term(b, x, stop);
     else
       conjugate_gradients(
@@ -35,6 +39,7 @@ class ConjugateGradient final : public IterativeSolver {
 
   void three_term(std::span<const double> b, std::span<double> x, StopTest& stop);
 
+  bool three_term_;
   KrylovVectors work_;
   std::vector<double> previous_, change_;
 };
@@ -100,6 +105,8 @@ void ConjugateGradient::three_term(std::span<const double> b, std::span<double> 
 }
 
 }  // namespace
+
+std::span<const Option> conjugate_gradient_options() { return {&form, 1}; }
 
 std::unique_ptr<LinearSolver> make_conjugate_gradient(const SolverOptions& options) {
   return std::make_unique<ConjugateGradient>(options);

@@ -1,7 +1,5 @@
 // Block Jacobi, eq. (15) of [sharf1993]: D f+ = b + (D - A) f, which is f+ = f + (b - A~ f) on A~.
 
-#include "linkwise/solve/iterative/jacobi.hpp"
-
 #include "linkwise/linear/vector.hpp"
 #include "linkwise/solve/iterative/iterative_solver.hpp"
 

@@ -4,8 +4,6 @@
 // iterations finish the solve. The factor is renewed when a solve took more than lag_limit
 // iterations, failed, or met another structure.
 
-#include "linkwise/solve/iterative/lagged_thomas.hpp"
-
 #include <algorithm>
 
 #include "linkwise/solve/direct/tree_factor.hpp"
@@ -14,10 +12,17 @@
 namespace linkwise {
 namespace {
 
+constexpr Option lag_limit{.name = "lag_limit",
+                           .fallback = 8,
+                           .text = "iterations of a solve after which the factor is renewed",
+                           .accepts = at_least_one,
+                           .wanted = "give 1 or more"};
+
 class LaggedThomas final : public PreconditionedConjugateGradient {
  public:
   explicit LaggedThomas(const SolverOptions& options)
-      : PreconditionedConjugateGradient(options, Coordinates::original) {}
+      : PreconditionedConjugateGradient(options, Coordinates::original),
+        limit_(options.own.count(lag_limit)) {}
 
  private:
   Outcome prepare(const BlockTree& A) override {
@@ -33,13 +38,16 @@ class LaggedThomas final : public PreconditionedConjugateGradient {
   }
 
   void finished(const Report& report) override {
-    if (!report.ok() || report.iterations > options_.lag_limit) factor_.clear();
+    if (!report.ok() || report.iterations > limit_) factor_.clear();
   }
 
+  int limit_;
   TreeFactor factor_;
 };
 
 }  // namespace
+
+std::span<const Option> lagged_thomas_options() { return {&lag_limit, 1}; }
 
 std::unique_ptr<LinearSolver> make_lagged_thomas(const SolverOptions& options) {
   return std::make_unique<LaggedThomas>(options);

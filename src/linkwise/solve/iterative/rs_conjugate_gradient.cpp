@@ -6,13 +6,10 @@
 // which halves the iterations, and a product with S costs no more than one with A~. With hubs S
 // keeps the couplings of the nodes that are not red.
 
-#include "linkwise/solve/iterative/rs_conjugate_gradient.hpp"
-
 #include <algorithm>
 
 #include "linkwise/solve/iterative/iterative_solver.hpp"
 #include "linkwise/solve/iterative/krylov.hpp"
-#include "linkwise/solve/iterative/relaxation.hpp"
 
 namespace linkwise {
 namespace {
@@ -27,7 +24,7 @@ class ReducedConjugateGradient final : public IterativeSolver {
 
   Outcome prepare(const BlockTree&) override {
     if (!scaled().structure_changed()) return Outcome::converged;
-    colour_nodes(scaled(), colours_);
+    scaled().colour(colours_);
     colour_.resize(colours_.size());
     for (std::size_t i = 0; i < colours_.size(); ++i) colour_[i] = colours_[i] == 0 ? red : black;
     for (std::vector<double>* v : {&right_, &argument_}) v->resize(scaled().size());

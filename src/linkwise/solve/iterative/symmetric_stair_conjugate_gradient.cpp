@@ -7,8 +7,6 @@
 // with m joints allows eigenvalues of A~ up to m, so that hubs take M^-1 = m - A~, which stays
 // positive definite but gains less the larger the hub.
 
-#include "linkwise/solve/iterative/symmetric_stair_conjugate_gradient.hpp"
-
 #include "linkwise/solve/iterative/preconditioned.hpp"
 
 namespace linkwise {

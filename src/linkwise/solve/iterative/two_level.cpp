@@ -1,4 +1,10 @@
-// Conjugate gradients preconditioned by exact solves on pieces of k joints and a coarse space.
+// Conjugate gradients preconditioned by exact solves on pieces of k joints, without and with a
+// coarse space.
+//
+// The pieces alone are additive Schwarz without overlap, block Jacobi with larger blocks
+// [smith1996, chapter 1]. Every piece can work at once. The iterations fall with k, but on a chain
+// whose condition grows with its length they still grow with the number of pieces; the coarse space
+// cures that.
 //
 // With J the pieces and Q = V (V^T A V)^-1 V^T the coarse correction, the preconditioner is
 //     z = J^-1 r,   z <- z + Q (r - A z),
@@ -7,36 +13,74 @@
 // passes the cuts freely (CoarseSpace), so that the iterations depend on neither the number of
 // pieces nor on what the chain's condition number grows with.
 
-#include "linkwise/solve/iterative/two_level.hpp"
-
 #include <algorithm>
 
 #include "linkwise/linear/residual.hpp"
 #include "linkwise/linear/vector.hpp"
 #include "linkwise/solve/direct/tree_factor.hpp"
 #include "linkwise/solve/iterative/coarse_space.hpp"
-#include "linkwise/solve/iterative/pieces.hpp"
 #include "linkwise/solve/iterative/preconditioned.hpp"
 
 namespace linkwise {
 namespace {
 
-class TwoLevel final : public PreconditionedConjugateGradient {
+constexpr Option block_size{.name = "block_size",
+                            .fallback = 0,
+                            .text = "joints per piece; 0: default",
+                            .accepts = at_least_zero,
+                            .wanted = "give 1 or more, or 0 for the solver's default"};
+
+/// cut[i] = 1 where node i starts a piece of its own: every `joints` nodes down from the base. The
+/// joints of a hub stay together with its inboard joint, so that pieces around hubs grow larger and
+/// a tree that branches everywhere stays whole.
+void cut_into_pieces(const BlockTree& A, int joints, std::vector<char>& cut) {
+  std::vector<int> depth(A.n(), 1);
+  cut.assign(A.n(), 0);
+  for (int i = 0; i < A.n(); ++i) {
+    const int p = A.parent[i];
+    if (p < 0) continue;
+    depth[i] = depth[p] + 1;
+    if (depth[i] <= joints || A.lever_of[i] >= 0) continue;
+    depth[i] = 1;
+    cut[i] = 1;
+  }
+}
+
+class BlockSchwarz : public PreconditionedConjugateGradient {
  public:
-  explicit TwoLevel(const SolverOptions& options)
-      : PreconditionedConjugateGradient(options, Coordinates::original) {}
+  BlockSchwarz(const SolverOptions& options, int default_size)
+      : PreconditionedConjugateGradient(options, Coordinates::original),
+        joints_(options.own.count(block_size) > 0 ? options.own.count(block_size) : default_size) {}
+
+ protected:
+  Outcome prepare(const BlockTree& A) override {
+    if (!pieces_.fits(A)) cut_into_pieces(A, joints_, cut_);
+    const Outcome outcome = pieces_.factor(A, cut_);
+    set_failed_node(pieces_.failed_node());
+    return outcome;
+  }
+
+  void precondition(std::span<const double> r, std::span<double> z) override {
+    std::copy(r.begin(), r.end(), z.begin());
+    pieces_.solve_in_place(z);
+  }
+
+  int joints_;
+  TreeFactor pieces_;
+  std::vector<char> cut_;
+};
+
+class TwoLevel final : public BlockSchwarz {
+ public:
+  using BlockSchwarz::BlockSchwarz;
 
  private:
-  static constexpr int default_block_size = 32;
   // Cosines below this converge within the iteration: fewer coarse vectors, hardly more iterations.
   static constexpr double threshold = 0.4;
 
   Outcome prepare(const BlockTree& A) override {
     const bool known = pieces_.fits(A);
-    if (!known)
-      cut_into_pieces(A, options_.block_size > 0 ? options_.block_size : default_block_size, cut_);
-    const Outcome outcome = pieces_.factor(A, cut_);
-    set_failed_node(pieces_.failed_node());
+    const Outcome outcome = BlockSchwarz::prepare(A);
     if (outcome != Outcome::converged) return outcome;
     if (!known) coarse_.set_pieces(A, cut_);
     coarse_.build(A, pieces_, threshold);
@@ -45,8 +89,7 @@ class TwoLevel final : public PreconditionedConjugateGradient {
   }
 
   void precondition(std::span<const double> r, std::span<double> z) override {
-    std::copy(r.begin(), r.end(), z.begin());
-    pieces_.solve_in_place(z);
+    BlockSchwarz::precondition(r, z);
     coarse_.restrict_cuts(system(), z);
     coarse_.solve();
     coarse_.prolong_add(z);
@@ -91,16 +134,20 @@ class TwoLevel final : public PreconditionedConjugateGradient {
     accurate_residual(system(), b, x, work_.r);
   }
 
-  TreeFactor pieces_;
   CoarseSpace coarse_;
-  std::vector<char> cut_;
   std::vector<double> scratch_, correction_;
 };
 
 }  // namespace
 
+std::span<const Option> pieces_options() { return {&block_size, 1}; }
+
+std::unique_ptr<LinearSolver> make_block_schwarz_conjugate_gradient(const SolverOptions& options) {
+  return std::make_unique<BlockSchwarz>(options, 8);
+}
+
 std::unique_ptr<LinearSolver> make_two_level(const SolverOptions& options) {
-  return std::make_unique<TwoLevel>(options);
+  return std::make_unique<TwoLevel>(options, 32);
 }
 
 }  // namespace linkwise
