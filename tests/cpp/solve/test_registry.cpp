@@ -64,9 +64,11 @@ TEST(Registry, NamesAndValuesAreInverse) {
 TEST(Registry, OptionsOutOfRangeAreRejectedByName) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto rejects = [](const char* name, auto set) {
-    SolverOptions options;
-    set(options);
-    const std::string text = complaint([&] { make_solver("conjugate_gradient", options); });
+    const std::string text = complaint([&] {
+      SolverOptions options;
+      set(options);
+      make_solver("conjugate_gradient", options);
+    });
     EXPECT_EQ(text.find("solver options: " + std::string(name) + " is "), 0u) << text;
     EXPECT_NE(text.find("; "), std::string::npos) << text;
   };

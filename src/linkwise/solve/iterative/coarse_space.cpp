@@ -74,10 +74,14 @@ void CoarseSpace::reserve() {
   const auto most = [](const Piece& piece) {
     return 6 * (piece.tails.size() + (piece.parent >= 0 ? 1 : 0));
   };
-  for (Piece& piece : pieces_) {
-    piece.columns.reserve(most(piece));
-    piece.pivot.reserve(most(piece) * most(piece));
-    if (piece.parent >= 0) piece.inboard.reserve(most(piece) * most(pieces_[piece.parent]));
+  matrix_.nodes.assign(pieces_.size(), {});
+  for (std::size_t j = 0; j < pieces_.size(); ++j) {
+    const Piece& piece = pieces_[j];
+    DenseTree::Node& node = matrix_.nodes[j];
+    node.parent = piece.parent;
+    node.unknowns.reserve(most(piece));
+    node.pivot.reserve(most(piece) * most(piece));
+    if (piece.parent >= 0) node.inboard.reserve(most(piece) * most(pieces_[piece.parent]));
   }
 }
 
@@ -106,7 +110,7 @@ void CoarseSpace::add_column(const BlockTree& A, int piece, int node,
     for (int k = 0; k < A.dim[node]; ++k)
       for (int r = 0; r < A.dim[i]; ++r) to[r] += force[k] * responses[k][A.offset[i] + r];
   }
-  pieces_[piece].columns.push_back(static_cast<int>(columns_.size()));
+  matrix_.nodes[piece].unknowns.push_back(static_cast<int>(columns_.size()));
   columns_.push_back({node, force, begin});
 }
 
@@ -142,10 +146,41 @@ void CoarseSpace::select(const BlockTree& A, const Cut& cut, double threshold) {
   }
 }
 
+/// E_jj, whose columns are responses J^-1 E f: row a of it is the force f_a on what the others do
+/// at its node; and E_jq over the cut towards the base.
+void CoarseSpace::assemble(const BlockTree& A, int j) {
+  const Piece& piece = pieces_[j];
+  DenseTree::Node& node = matrix_.nodes[j];
+  const std::vector<int>& own = columns(j);
+  const std::size_t m = own.size();
+  node.pivot.assign(m * m, 0.0);
+  for (std::size_t a = 0; a < m; ++a) {
+    const Column& column = columns_[own[a]];
+    for (std::size_t b = 0; b < m; ++b) {
+      const double* const at = value(own[b], column.node);
+      for (int k = 0; k < A.dim[column.node]; ++k) node.pivot[m * a + b] += column.force[k] * at[k];
+    }
+  }
+  if (piece.parent < 0) return;
+  const Cut& cut = cuts_[piece.cut];
+  const std::vector<int>& others = columns(piece.parent);
+  node.inboard.assign(m * others.size(), 0.0);
+  for (std::size_t a = 0; a < m; ++a) {
+    double force[6] = {};  // on the tail by this column
+    block_transpose_multiply_add(A.dim[cut.root], A.dim[cut.tail], A.parent_block[cut.root],
+                                 value(own[a], cut.root), force);
+    for (std::size_t b = 0; b < others.size(); ++b) {
+      const double* const at = value(others[b], cut.tail);
+      for (int k = 0; k < A.dim[cut.tail]; ++k)
+        node.inboard[others.size() * a + b] += force[k] * at[k];
+    }
+  }
+}
+
 void CoarseSpace::build(const BlockTree& A, TreeFactor& pieces, double threshold) {
   columns_.clear();
   values_.clear();
-  for (Piece& piece : pieces_) piece.columns.clear();
+  for (DenseTree::Node& node : matrix_.nodes) node.unknowns.clear();
   forced_.clear();
   for (const Cut& cut : cuts_) forced_.push_back(cut.root);
   respond(A, pieces, forced_, root_responses_);
@@ -160,15 +195,17 @@ void CoarseSpace::build(const BlockTree& A, TreeFactor& pieces, double threshold
       if (piece.tails.size() > round) select(A, cuts_[piece.tails[round]], threshold);
   }
   coarse_.resize(columns_.size());
-  factor(A);
+  for (int j = 0; j < static_cast<int>(pieces_.size()); ++j) assemble(A, j);
+  // The columns have unit energy: a pivot at rounding level belongs to one that others span.
+  matrix_.factor(1e-13);
 }
 
 void CoarseSpace::restrict_all(std::span<const double> r) {
-  for (const Piece& piece : pieces_)
-    for (int column : piece.columns) {
+  for (std::size_t j = 0; j < pieces_.size(); ++j)
+    for (int column : columns(static_cast<int>(j))) {
       double sum = 0.0;
       const double* from = values_.data() + columns_[column].begin;
-      for (int i : piece.nodes) {
+      for (int i : pieces_[j].nodes) {
         const int at = offset_[i], dim = offset_[i + 1] - at;
         for (int k = 0; k < dim; ++k) sum += *from++ * r[at + k];
       }
@@ -185,19 +222,19 @@ void CoarseSpace::restrict_cuts(const BlockTree& A, std::span<const double> z) {
     block_multiply_add(rows, cols, coupling, z.data() + A.offset[cut.tail], on_root, -1.0);
     block_transpose_multiply_add(rows, cols, coupling, z.data() + A.offset[cut.root], on_tail,
                                  -1.0);
-    for (int column : pieces_[cut.piece].columns)
+    for (int column : columns(cut.piece))
       for (int k = 0; k < rows; ++k) coarse_[column] += value(column, cut.root)[k] * on_root[k];
-    for (int column : pieces_[cut.parent_piece].columns)
+    for (int column : columns(cut.parent_piece))
       for (int k = 0; k < cols; ++k) coarse_[column] += value(column, cut.tail)[k] * on_tail[k];
   }
 }
 
 void CoarseSpace::prolong_add(std::span<double> x) const {
-  for (const Piece& piece : pieces_)
-    for (int column : piece.columns) {
+  for (std::size_t j = 0; j < pieces_.size(); ++j)
+    for (int column : columns(static_cast<int>(j))) {
       const double factor = coarse_[column];
       const double* from = values_.data() + columns_[column].begin;
-      for (int i : piece.nodes) {
+      for (int i : pieces_[j].nodes) {
         const int at = offset_[i], dim = offset_[i + 1] - at;
         for (int k = 0; k < dim; ++k) x[at + k] += factor * *from++;
       }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "linkwise/linear/block_tree.hpp"
+#include "linkwise/linear/dense_tree.hpp"
 #include "linkwise/solve/direct/tree_factor.hpp"
 
 namespace linkwise {
@@ -33,7 +34,7 @@ class CoarseSpace {
   /// c = V^T (r - A z) for z = J^-1 r, when only the cuts' couplings are left of r - A z.
   void restrict_cuts(const BlockTree& A, std::span<const double> z);
   /// c <- (V^T A V)^-1 c; returns the product of both, the square of the correction's A-norm.
-  double solve();
+  double solve() { return matrix_.solve_in_place(coarse_); }
   /// x += V c
   void prolong_add(std::span<double> x) const;
 
@@ -44,8 +45,6 @@ class CoarseSpace {
     int cut = -1;     ///< the cut towards it
     int size = 0;     ///< scalars
     std::vector<int> nodes, tails;
-    std::vector<int> columns;
-    std::vector<double> pivot, inboard;  ///< coarse L, 1 / D and L^-1 E_jq, dense
   };
   struct Cut {
     int piece = -1, root = -1;         ///< the outboard piece and its root
@@ -66,10 +65,12 @@ class CoarseSpace {
     return values_.data() + columns_[column].begin + local_[node];
   }
   void reserve();
-  void factor(const BlockTree& A);
-  void assemble(const BlockTree& A, Piece& piece);
+  void assemble(const BlockTree& A, int piece);
+  /// The unknowns of E that belong to a piece; columns_ are numbered alike.
+  const std::vector<int>& columns(int piece) const { return matrix_.nodes[piece].unknowns; }
 
   std::vector<Piece> pieces_;
+  DenseTree matrix_;  ///< E = V^T A V, a node per piece
   std::vector<Cut> cuts_;
   std::vector<int> offset_;
   std::vector<int> piece_of_, local_;  ///< per node: piece, first scalar within it
