@@ -117,8 +117,9 @@ def tighter_run(run: Run, path: Path, quiet: bool) -> Run:
     machine = scenario.load_model()
     arguments = scenario.simulate_arguments(machine)
     used = json.loads(run.dataset.attrs["options"])
+    tighter = {"step_tolerance": used["step_tolerance"] / TIGHTER}
     arguments |= {
-        "step_tolerance": used["step_tolerance"] / TIGHTER,
+        "numerics": arguments["numerics"] | tighter,
         "times": run.dataset["time"].values,
         "every": None,
         "duration": None,
