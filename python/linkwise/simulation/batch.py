@@ -15,7 +15,7 @@ from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
 from linkwise.simulation.arguments import number, optional_count, sample_times
-from linkwise.simulation.simulate import SimulationInterrupted, check_driven
+from linkwise.simulation.simulate import SimulationInterrupted, check_driven, set_driven
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -168,14 +168,7 @@ def simulate_batch(
     for one in models:
         by_joint, by_body = check_driven(one, drives, wrenches)
         simulation = _core.Simulation(one, **options)
-        for joint, drive in by_joint.items():
-            try:
-                drive.check(one, joint, float(sampled[-1]))
-            except InputError as error:
-                raise InputError(f"drives[{joint!r}]: {error}") from None
-            drive.apply(simulation, joint)
-        for body, wrench in by_body.items():
-            wrench.apply(simulation, body)
+        set_driven(simulation, one, by_joint, by_body, float(sampled[-1]))
         simulations.append(simulation)
     lead, rows = _members(given, len(models))
     lead = lead if isinstance(model, Model) else (len(models), *lead)

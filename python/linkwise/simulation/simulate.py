@@ -70,6 +70,24 @@ def check_driven(
     return by_joint, by_body
 
 
+def set_driven(
+    simulation: Simulation,
+    model: Model,
+    by_joint: Mapping[str, Drive],
+    by_body: Mapping[str, Wrench],
+    end: float,
+) -> None:
+    """Give the simulation its drives and wrenches, which must last until `end` [s]."""
+    for joint, drive in by_joint.items():
+        try:
+            drive.check(model, joint, end)
+        except InputError as error:
+            raise InputError(f"drives[{joint!r}]: {error}") from None
+        drive.apply(simulation, joint)
+    for body, wrench in by_body.items():
+        wrench.apply(simulation, body)
+
+
 def _chosen(
     simulation: Simulation, drives: Mapping[str, Drive], wrenches: Mapping[str, Wrench]
 ) -> dict[str, Any]:
@@ -239,16 +257,8 @@ def simulate(
         # While all joints rest, steps would grow until they pass over a whole short motion.
         options["max_step"] = float(sampled[-1]) / 50 or None
     count = optional_count("threads", threads)
-    for joint, drive in by_joint.items():
-        try:
-            drive.check(model, joint, float(sampled[-1]))
-        except InputError as error:
-            raise InputError(f"drives[{joint!r}]: {error}") from None
     simulation = _core.Simulation(model, **options, threads=count)
-    for joint, drive in by_joint.items():
-        drive.apply(simulation, joint)
-    for body, wrench in by_body.items():
-        wrench.apply(simulation, body)
+    set_driven(simulation, model, by_joint, by_body, float(sampled[-1]))
     simulation.start(0.0, *start)
     attrs = provenance(
         model,
