@@ -130,9 +130,7 @@ def check_picture(root: Path) -> list[str]:
     if not document.is_file():
         return []
     shown = ARROWS.search(document.read_text(encoding="utf-8"))
-    if shown is None:
-        return []
-    if shown[0] == f"{shown[1]}{picture(root)}{shown[2]}":
+    if shown and shown[0] == f"{shown[1]}{picture(root)}{shown[2]}":
         return []
     return ["ARCHITECTURE.md: its arrows are not the code's; run tools/check_layers.py --arrows"]
 

@@ -1,8 +1,13 @@
 """The check of words finds stale file names and the phrases that it bans, and nothing else."""
 
+import subprocess
+from pathlib import Path
+
 import check_words as words
 import pytest
 import source_text
+
+ROOT = Path(__file__).parents[2]
 
 
 def check(root, path, text):
@@ -50,3 +55,11 @@ def test_comments_keep_their_lines():
     text = 'int a; // one\nconst char* s = "// none";\n/* two\nthree */ int b;\n'
     lines = [line.strip() for line in source_text.cpp_comments(text).splitlines()]
     assert lines == ["one", "", "two", "three"]
+
+
+def test_this_repository_passes():
+    try:
+        paths = source_text.tracked_files(ROOT)
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("not a git checkout")
+    assert words.check(ROOT, paths) == []
