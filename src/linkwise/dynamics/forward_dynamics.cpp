@@ -48,7 +48,7 @@ std::unique_ptr<DynamicsMethod> make_method(const Model& model, const DynamicsOp
   return std::make_unique<Method>(model, options);
 }
 
-/// The system eliminated as it is assembled: what "thomas" stands for unless more than the solution
+/// The system eliminated as it is assembled. "thomas" stands for it, unless more than the solution
 /// is asked of the solver.
 class FusedConstraintForce : public DynamicsMethod {
  public:
@@ -122,8 +122,8 @@ const DynamicsEntry& find_dynamics(std::string_view name) {
   throw InputError("method '" + std::string(name) + "' is unknown; known: " + known);
 }
 
-/// Shorter chains leave the pieces too short to pay for the cut system:
-/// benchmarks/cpp/crossovers.cpp.
+/// On shorter chains the pieces are too short to pay for the cut system
+/// (benchmarks/cpp/crossovers.cpp).
 constexpr int piecewise_from = 64;
 
 Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {

@@ -1,7 +1,6 @@
 #pragma once
 // The table of dynamics methods: ways from (q, v, tau) to accelerations and joint loads. A new
-// method is one file and one line; command line, Python, tests and benchmarks follow from the
-// table.
+// method is one file and one line. Command line, Python, tests and benchmarks read the table.
 #include <memory>
 #include <span>
 #include <string>
@@ -43,7 +42,7 @@ struct DynamicsEntry {
   std::string_view description;
   std::string_view reference;  ///< key in references.bib
   bool uses_solver;
-  bool chains_only;  ///< takes one kind of machine only; the others take every tree
+  bool chains_only;  ///< takes one kind of machine; the others take every tree
   bool linear_time;  ///< the work grows as the number of bodies; the others are for short chains
   std::unique_ptr<DynamicsMethod> (*make)(const Model&, const DynamicsOptions&);
 };
