@@ -2,7 +2,7 @@
 // Joint-space mass matrix by composite inertias, and forward dynamics by its Cholesky factor
 // (method 3 of [walker1982]; branch-induced sparsity as in [featherstone2008, ch. 6]):
 //     H_ij = P_j^T (X ... X)^T Yc_i P_i,   H = L^T L keeps zero what H has zero.
-// It takes It takes O(N depth) time and O(nv^2) memory: the reference for small machines, hopeless
+// It takes O(N depth) time and O(nv^2) memory: the reference for small machines, hopeless
 // for long chains.
 #include <vector>
 
