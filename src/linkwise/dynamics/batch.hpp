@@ -8,7 +8,7 @@
 
 namespace linkwise {
 
-/// Row-major arrays with one row a system; null where a quantity is absent.
+/// Row-major arrays with one row per system; null where a quantity is absent.
 struct BatchInput {
   const double* q = nullptr;
   const double* v = nullptr;

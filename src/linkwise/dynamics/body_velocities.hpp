@@ -2,7 +2,7 @@
 // Equations of motion in the paper's own state: joint coordinates q and the absolute velocities v_n
 // of the bodies, each in its frame [sharf1993, section 3]. Joint rates follow locally,
 //     u_n = P_n^+ (v_n - X_n v_p),      dv_n/dt = a_n of A f = b,
-// so that nothing passes from body to body, in return for 6 numbers a body and for a drift: what
+// so that nothing passes from body to body, in return for 6 numbers per body and for a drift: what
 // v_n - X_n v_p has in the constrained directions is held at zero by its derivative alone.
 #include <memory>
 #include <span>

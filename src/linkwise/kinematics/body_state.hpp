@@ -138,7 +138,7 @@ LW_INLINE void calc_range_states(const Model& model, const KindRange& range,
       const BodyConstants<double>& k = model.constants[n];
       BodyState<S>& s = states[n];
       // By reference: a copy would be loaded in wide words that the narrow stores just before it
-      // cannot be forwarded to, a stall of a dozen cycles a body.
+      // cannot be forwarded to, a stall of a dozen cycles per body.
       const Motion<S>& v_parent = body.parent >= 0 ? states[body.parent].v : resting;
       if constexpr (is_general<J>) {
         calc_general_state(model, body, in, v_parent, s, general[body.general]);
