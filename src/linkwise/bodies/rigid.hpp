@@ -22,4 +22,8 @@ LW_INLINE Force<Wider<C, S>> momentum_bias(const RigidBody<C>& body, const Motio
   return cross_dual(v, body * v);
 }
 
+/// Acceleration of the inboard port per wrench on it, all else left free: M^-1. The inertia must be
+/// regular.
+inline Compliance<double> compliance(const RigidBody<double>& body) { return invert_inertia(body); }
+
 }  // namespace linkwise

@@ -21,7 +21,7 @@ TreeSystem::TreeSystem(const Model& model, const Executor& executor)
   std::vector<int> parent, dim;
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int n = 0; n < model.n_bodies(); ++n) {
-    compliance_.push_back(invert_inertia(model.constants[n].inertia));
+    compliance_.push_back(compliance(model.constants[n].inertia));
     const BodyTopology& body = model.topology[n];
     parent.push_back(body.parent);
     dim.push_back(constraint_rows(model, n));
@@ -182,7 +182,7 @@ void TreeSystem::assemble_at(const SweepInput<double>& in, std::span<const Motio
       state.c = cross(state.X * v_parent, relative);
     }
     state.v = v[n];
-    state.bias = cross_dual(v[n], model.constants[n].inertia * v[n]);
+    state.bias = momentum_bias(model.constants[n].inertia, v[n]);
     state.bias += external;
   }
   calc_constraints();

@@ -9,6 +9,7 @@
 // compliance, which in this basis is 1/I in the last place.
 #include "linkwise/dynamics/joint_elimination.hpp"
 #include "linkwise/kinematics/placement.hpp"
+#include "linkwise/recursion/steps.hpp"
 
 namespace linkwise {
 

@@ -5,6 +5,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/kinematics/body_columns.hpp"
+#include "linkwise/recursion/tolerances.hpp"
 #include "linkwise/spatial/composite.hpp"
 
 namespace linkwise {
@@ -83,8 +84,6 @@ void CompositeRigidBody::mass_matrix(const double* q, double* H) {
     for (size_t j = 0; j <= i; ++j)
       H[dof_[i] * nv + dof_[j]] = H[dof_[j] * nv + dof_[i]] = H_[i * n_dof + j];
 }
-
-constexpr double smallest_pivot = 1e-13;  // of the diagonal entry: below, rounding noise
 
 /// H = L^T L in place, from the tips down; returns false at a pivot that is not positive.
 bool CompositeRigidBody::factor() {

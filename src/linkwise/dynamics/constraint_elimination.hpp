@@ -20,7 +20,7 @@
 
 #include "linkwise/dynamics/axis_constraint.hpp"
 #include "linkwise/dynamics/general_elimination.hpp"
-#include "linkwise/dynamics/inverse_dynamics.hpp"
+#include "linkwise/dynamics/refinement.hpp"
 
 namespace linkwise {
 
@@ -32,10 +32,11 @@ class ConstraintElimination {
       : model_(&model),
         body_(model.n_bodies()),
         across_(model.n_bodies()),
-        general_(model.n_general) {
+        general_(model.n_general),
+        refinement_(model) {
     require_regular_inertias(model);
     for (int n = 0; n < model.n_bodies(); ++n)
-      compliance_.push_back(invert_inertia(model.constants[n].inertia));
+      compliance_.push_back(compliance(model.constants[n].inertia));
     for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       if constexpr (!is_general<J>)
@@ -72,8 +73,6 @@ class ConstraintElimination {
   }
 
  private:
-  static constexpr double acceptable_violation = 1e-12;
-
   struct BodyWork {
     Motion<S> v;      ///< velocity, then acceleration
     Force<S> g;       ///< wrenches other than the joints' unknown ones
@@ -111,11 +110,14 @@ class ConstraintElimination {
   }
 
   void finish(const SweepInput<S>& in, S* du, S* loads, S* forces) {
-    if (loads)
-      store_joint_loads(
-          *model_, in.q, [&](int n) -> const Force<S>& { return body_[n].load; }, loads);
+    if (loads) store_loads(in.q, loads);
     if (forces) for_forces([&, i = 0](const S& f) mutable { forces[i++] = f; });
-    correct(in, du, loads, forces);
+    refine(in, du, loads, forces);
+  }
+
+  void store_loads(const S* q, S* loads) const {
+    store_joint_loads(
+        *model_, q, [&](int n) -> const Force<S>& { return body_[n].load; }, loads);
   }
 
   template <bool again>
@@ -133,11 +135,10 @@ class ConstraintElimination {
           general_[body.general].calc_state(model, body, in, v_parent, again, w.v);
         } else {
           if constexpr (!again) calc_axis_pose<J>(k, in.q[body.q], w.at);
-          Motion<S> v = after_motion<J>(w.at, before_motion<J>(k, v_parent));
-          J::add_rate(v, k.pitch, in.v ? in.v[body.v] : S{});
-          store(w.v, v);
+          store(w.v, outward_velocity<J>(MovedAxis<J, S>{k, w.at}, v_parent, k.pitch,
+                                         in.v ? in.v[body.v] : S{}));
         }
-        const Force<S> h = cross_dual(w.v, k.inertia * w.v);
+        const Force<S> h = momentum_bias(k.inertia, w.v);
         w.g = {-h.lin, -h.ang};
         if constexpr (is_general<J>)
           general_[body.general].add_drives(armature(), in.tau, w.g,
@@ -281,7 +282,7 @@ class ConstraintElimination {
     Force<S> r = to_wrench<J>(w.joint.f, rows == 6 ? w.joint.f[5] : S{}, k.pitch);
     if (body.parent >= 0) body_[body.parent].r -= at_parent<J>(k, r);
     apply_motion<J>(w.at, r);
-    Motion<S> a = after_motion<J>(w.at, before_motion<J>(k, a_parent));
+    Motion<S> a = MovedAxis<J, S>{k, w.at}.to_child(a_parent);
     a += J::bias(w.v, k.pitch, in.v ? in.v[body.v] : S{});
     const S rate = dot(w.along, r) + rate_of<J>(w.alpha) - rate_of<J>(a);
     du[body.v] = rate;
@@ -326,37 +327,17 @@ class ConstraintElimination {
     return worst / (largest + std::numeric_limits<double>::min());
   }
 
-  /// Where a light body carries a heavy one, Phi holds the heavy one's answer in its last digits
-  /// only. Newton-Euler, which does not suffer, gives the loads of the accelerations found and the
-  /// torques that they miss; the answer to these, through the same factors, is added to both.
-  void correct(const SweepInput<S>& in, S* du, S* loads, S* forces) {
+  void refine(const SweepInput<S>& in, S* du, S* loads, S* forces) {
     const S off = violation();
-    bool any = false;
-    for (int l = 0; l < lane_count<S>; ++l) any |= lane(off, l) > acceptable_violation;
-    if (!any) return;
-    const Model& model = *model_;
-    if (!inverse_) inverse_ = std::make_unique<InverseDynamics<S>>(model);
-    missing_.resize(model.nv());
-    const int n_loads = loads ? 6 * model.n_joints() : 0;
-    given_loads_.resize(n_loads);
-    inverse_->evaluate(in, du, missing_.data(), loads ? given_loads_.data() : nullptr);
-    for (int i = 0; i < model.nv(); ++i) missing_[i] = in.tau[i] - missing_[i];
-    SweepInput<S> rest;
-    rest.q = in.q;
-    rest.tau = missing_.data();
-    rest.gravity_factor = 0;
-    response_.assign(model.nv(), S{});
-    sweep<true>(rest, response_.data());
-    const auto where = [&](const S& yes, const S& no) {
-      return off > acceptable_violation ? yes : no;
-    };
-    for (int i = 0; i < model.nv(); ++i) du[i] = du[i] + where(response_[i], S{});
-    if (forces) for_forces([&, i = 0](const S& df) mutable { forces[i] += where(df, S{}), ++i; });
-    if (!loads) return;
-    response_.resize(n_loads);
-    store_joint_loads(
-        model, in.q, [&](int n) -> const Force<S>& { return body_[n].load; }, response_.data());
-    for (int i = 0; i < n_loads; ++i) loads[i] = where(given_loads_[i] + response_[i], loads[i]);
+    if (!Refinement<S>::is_due(off)) return;
+    refinement_.refine(in, off, du, loads, [&](const auto& rest, S* more, S* more_loads) {
+      sweep<true>(rest, more);
+      if (more_loads) store_loads(in.q, more_loads);
+      if (forces)
+        for_forces([&, i = 0](const S& df) mutable {
+          forces[i++] += Refinement<S>::choose(off, df, S{});
+        });
+    });
   }
 
   /// In the bases that calc_joint_constraint() chooses.
@@ -396,8 +377,7 @@ class ConstraintElimination {
   std::vector<Compliance<double>> compliance_;  ///< the bodies' own
   std::vector<Across<double>> across_;          ///< of each body's first joint of one axis
   std::vector<GeneralElimination<S>> general_;
-  std::unique_ptr<InverseDynamics<S>> inverse_;  ///< made for the first correction
-  std::vector<S> missing_, response_, given_loads_;
+  Refinement<S> refinement_;
   int failed_body_ = -1;
 };
 

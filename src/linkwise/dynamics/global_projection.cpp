@@ -5,14 +5,9 @@
 #include <string>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/recursion/tolerances.hpp"
 
 namespace linkwise {
-namespace {
-
-constexpr double smallest_pivot = 1e-13;  // of the diagonal entry: below, rounding noise
-
-}  // namespace
-
 GlobalProjection::GlobalProjection(const Model& model)
     : model_(&model),
       inverse_(model),

@@ -60,7 +60,7 @@ class InverseDynamics {
           J::add_rate(a, k.pitch, du ? du[body.v] : S{});
         }
         a_[n] = a;
-        w_[n] = k.inertia * a;
+        w_[n] = momentum(k.inertia, a);
         w_[n] += state_[n].bias;
       }
     });

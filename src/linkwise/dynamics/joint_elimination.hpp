@@ -5,6 +5,7 @@
 // ones, a stall of a dozen cycles each time.
 #include <algorithm>
 
+#include "linkwise/recursion/tolerances.hpp"
 #include "linkwise/spatial/matrix6.hpp"
 
 namespace linkwise {
@@ -25,8 +26,6 @@ struct JointElimination {
     S V[6][6];          ///< D^-1 Z
   };
   JointElimination() : Phi{} {}
-
-  static constexpr double smallest_pivot = 1e-13;
 
   /// D: B^T Phi B + compliance, lower triangle by rows. Takes `before`, the parent's answer, to
   /// `after`; they may be the same. Returns a number that is positive when S is positive definite.

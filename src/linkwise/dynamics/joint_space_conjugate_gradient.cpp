@@ -54,7 +54,7 @@ void JointSpaceConjugateGradient::multiply(std::span<const double> x, std::span<
       a += Motion<double>{x[k] * P.lin, x[k] * P.ang};
     }
     a_[n] = a;
-    w_[n] = model.constants[n].inertia * a;
+    w_[n] = momentum(model.constants[n].inertia, a);
   }
   const std::vector<double>& armature = model.dof_values(DofProperty::armature);
   for (int n = model.n_bodies() - 1; n >= 0; --n) {

@@ -92,7 +92,7 @@ double kinetic_energy(const Model& model, const double* q, const double* v) {
   const auto states = states_of(model, q, v);
   double energy = 0;
   for (int n = 0; n < model.n_bodies(); ++n)
-    energy += 0.5 * dot(states[n].v, model.constants[n].inertia * states[n].v);
+    energy += 0.5 * dot(states[n].v, momentum(model.constants[n].inertia, states[n].v));
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int i = 0; i < model.nv(); ++i) energy += 0.5 * armature[i] * v[i] * v[i];
   return energy;
@@ -115,7 +115,7 @@ void momentum(const Model& model, const double* q, const double* v, double* h) {
   Force<double> total;
   for (int n = 0; n < model.n_bodies(); ++n) {
     const auto& X = frames[model.topology[n].first_element + model.topology[n].n_elements - 1];
-    total += transpose_times(X, model.constants[n].inertia * states[n].v);
+    total += transpose_times(X, momentum(model.constants[n].inertia, states[n].v));
   }
   const double values[6] = {total.lin.x, total.lin.y, total.lin.z,
                             total.ang.x, total.ang.y, total.ang.z};

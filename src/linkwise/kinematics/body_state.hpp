@@ -150,7 +150,7 @@ LW_INLINE void calc_range_states(const Model& model, const KindRange& range,
         s.c = J::bias(v, k.pitch, u);
         s.v = v;
       }
-      s.bias = cross_dual(s.v, k.inertia * s.v);
+      s.bias = momentum_bias(k.inertia, s.v);
     }
   });
 }

@@ -99,6 +99,17 @@ LW_INLINE void apply_motion(const AxisPose<S>& at, Force<S>& f) {
   }
 }
 
+/// The placement that takes the two steps.
+template <class J, class S>
+struct MovedAxis {
+  const BodyConstants<double>& constants;
+  const AxisPose<S>& at;
+
+  LW_INLINE Motion<S> to_child(const Motion<S>& v) const {
+    return after_motion<J>(at, before_motion<J>(constants, v));
+  }
+};
+
 /// Body frame -> frame before the joint's motion.
 template <class J, class S>
 LW_INLINE void undo_motion(const AxisPose<S>& at, Motion<S>& v) {

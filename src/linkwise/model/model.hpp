@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "linkwise/bodies/rigid.hpp"
 #include "linkwise/joints/element.hpp"
 #include "linkwise/model/joint_types.hpp"
 #include "linkwise/model/name_index.hpp"
@@ -37,7 +38,7 @@ struct BodyTopology {
 template <class C>
 struct BodyConstants {
   Transform<C> tree;  ///< previous frame -> body frame at zero; what one-element bodies need
-  Inertia<C> inertia;
+  RigidBody<C> inertia;
   C pitch{}, armature{};
   /// Of a hinge, after [denavit1955]: from the parent turn about x by alpha, go a along x and d
   /// along the new z, turn about z by q + theta.

@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "linkwise/simd/lanes.hpp"
 #include "linkwise/spatial/hinge.hpp"
 
 namespace linkwise {
