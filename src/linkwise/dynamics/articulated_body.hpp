@@ -46,7 +46,7 @@ class ArticulatedBody {
       sweeps_.add_external(in);
       sweeps_.template respond_joints<false>(in);
     }
-    sweeps_.template accelerate_bodies<true>(in, all, du);
+    sweeps_.accelerate_bodies(in, all, du, true);
     sweeps_.store_loads(in.q, loads);
   }
 

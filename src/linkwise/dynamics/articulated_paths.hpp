@@ -176,8 +176,7 @@ class ArticulatedPaths {
         const auto outer = [&](const auto& at) -> const auto& {
           return others_.body[at.body].sum.Y;
         };
-        const int failed = with_loads ? group.template eliminate_joints<true>(of, outer)
-                                      : group.template eliminate_joints<false>(of, outer);
+        const int failed = group.eliminate_joints(of, outer, with_loads);
         if (failed >= 0) others_.fail(failed);
       });
   }
@@ -201,10 +200,7 @@ class ArticulatedPaths {
           return groups_[at.group].acceleration(at.position, at.lane);
         return root.parent >= 0 ? others_.body[root.parent].acceleration : ground;
       };
-      if (with_loads)
-        group.template accelerate_bodies<true>(parent, du);
-      else
-        group.template accelerate_bodies<false>(parent, du);
+      group.accelerate_bodies(parent, du, with_loads);
     });
     for (Group& group : groups_)
       for (const auto& at : group.outer_parents)

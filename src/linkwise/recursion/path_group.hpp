@@ -103,8 +103,8 @@ class PathGroup {
 
   /// group(place): that of a place. from_outer(parent): the inertia that it carries on no path.
   /// Returns the number of a body whose D is not positive, the last one found, or -1.
-  template <bool with_loads, class GroupOf, class FromOuter>
-  int eliminate_joints(GroupOf&& group, FromOuter&& from_outer) {
+  template <class GroupOf, class FromOuter>
+  int eliminate_joints(GroupOf&& group, FromOuter&& from_outer, bool with_loads) {
     ArticulatedInertia<S> Y{};
     Force<S> p{};
     int failed = -1;
@@ -134,7 +134,7 @@ class PathGroup {
       s.axis.u = axis.u;
       PlanarInertia<S> Ya;
       reduce<RevoluteJoint>(Y, axis, RevoluteJoint::bias(s.velocity, 0.0, s.rate), Ya, p);
-      if constexpr (with_loads) {
+      if (with_loads) {
         store(reduced_[k].Y, Ya);
         store(reduced_[k].p, p);
       }
@@ -147,22 +147,20 @@ class PathGroup {
   }
 
   /// parent(root): the acceleration of the body that carries the path.
-  template <bool with_loads, class ParentMotion>
-  void accelerate_bodies(ParentMotion&& parent, double* du) {
+  template <class ParentMotion>
+  void accelerate_bodies(ParentMotion&& parent, double* du, bool with_loads) {
     Motion<S> a{};
     size_t root = roots.size();
     for (int k = length() - 1; k >= 0; --k) {
       State& s = state_[k];
       enter(k, root, parent, a);
       a = bodies_.place(k, s.turn).to_child(a);
-      Force<S> load;
-      if constexpr (with_loads) load = outward_load(reduced_[k].Y, reduced_[k].p, a);
+      if (with_loads) store(reduced_[k].joint_load, outward_load(reduced_[k].Y, reduced_[k].p, a));
       const Motion<S> c = RevoluteJoint::bias(s.velocity, 0.0, s.rate);
       const S rate = accelerate<RevoluteJoint>(s.axis, c, 0.0, a);
       for (int l = 0; l < lanes; ++l)
         if (const int i = index_[k].v[l]; i >= 0) du[i] = lane(rate, l);
       store(s.acceleration, a);
-      if constexpr (with_loads) store(reduced_[k].joint_load, load);
     }
   }
 

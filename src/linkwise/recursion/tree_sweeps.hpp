@@ -152,9 +152,11 @@ struct TreeSweeps {
         body[model.joints[j].body].sum.p -= user_wrench(in.external, model.joints[j], j);
   }
 
+  // Whether loads are wanted is asked while sweeping: two instantiations would be contracted to
+  // fused multiply-adds in two ways, and recording loads would change the motion's last bits.
+
   /// Tip to base: eliminates the joints. Everything outboard of the ranges has contributed.
-  template <bool with_loads>
-  void eliminate_joints(const SweepInput<S>& in, const Ranges& ranges) {
+  void eliminate_joints(const SweepInput<S>& in, const Ranges& ranges, bool with_loads) {
     for_kind_ranges_tip_to_base(ranges, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
       for (int n = end - 1; n >= begin; --n) {
@@ -165,7 +167,7 @@ struct TreeSweeps {
         if (at.n_children > 0) Y = b.sum.Y;
         add_inertia(Y, k.inertia);
         if constexpr (is_general<J>) {
-          eliminate_stack<with_loads>(in, n, Y);
+          eliminate_stack(in, n, Y, with_loads);
         } else {
           EliminatedAxis<S> axis;
           if (!eliminate_axis<J>(Y, b.sum.p, k, in.tau[at.v], axis)) fail(n);
@@ -176,14 +178,11 @@ struct TreeSweeps {
           Force<S> p = b.sum.p;
           ReducedInertia<J, S> Ya;
           reduce<J>(Y, axis, J::bias(b.velocity, k.pitch, in.v ? in.v[at.v] : S{}), Ya, p);
-          if constexpr (with_loads) keep<J>(n, Ya, p);
+          if (with_loads) keep<J>(n, Ya, p);
           if (at.parent >= 0) contribute(n, place<J>(n), Ya, p);
         }
       }
     });
-  }
-  void eliminate_joints(const SweepInput<S>& in, const Ranges& ranges, bool with_loads) {
-    with_loads ? eliminate_joints<true>(in, ranges) : eliminate_joints<false>(in, ranges);
   }
 
   /// Tip to base over all bodies for another right-hand side, with the factors at hand.
@@ -210,8 +209,7 @@ struct TreeSweeps {
   }
 
   /// Base to tip: accelerations and joint loads. Everything inboard of the ranges has its own.
-  template <bool with_loads>
-  void accelerate_bodies(const SweepInput<S>& in, const Ranges& ranges, S* du) {
+  void accelerate_bodies(const SweepInput<S>& in, const Ranges& ranges, S* du, bool with_loads) {
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
     for_kind_ranges_base_to_tip(ranges, [&](auto joint, int begin, int end) {
       using J = decltype(joint);
@@ -220,9 +218,9 @@ struct TreeSweeps {
         const BodyConstants<double>& k = model.constants[n];
         Body& b = body[n];
         Motion<S> a = place<J>(n).to_child(at.parent >= 0 ? body[at.parent].acceleration : ground);
-        Force<S> load;
-        if constexpr (with_loads)
-          load = outward_load(reduced[n].template inertia<J>(), reduced[n].p, a);
+        if (with_loads)
+          store(reduced[n].joint_load,
+                outward_load(reduced[n].template inertia<J>(), reduced[n].p, a));
         if constexpr (is_general<J>) {
           accelerate_stack(in, n, a, du);
         } else {
@@ -230,12 +228,8 @@ struct TreeSweeps {
           du[at.v] = accelerate<J>(b.axis, c, k.pitch, a);
         }
         store(b.acceleration, a);
-        if constexpr (with_loads) store(reduced[n].joint_load, load);
       }
     });
-  }
-  void accelerate_bodies(const SweepInput<S>& in, const Ranges& ranges, S* du, bool with_loads) {
-    with_loads ? accelerate_bodies<true>(in, ranges, du) : accelerate_bodies<false>(in, ranges, du);
   }
 
   void store_loads(const S* q, S* loads) const {
@@ -308,29 +302,28 @@ struct TreeSweeps {
     own.c = state.c;
   }
 
-  template <bool with_loads>
-  void eliminate_stack(const SweepInput<S>& in, int n, ArticulatedInertia<S>& Y) {
+  void eliminate_stack(const SweepInput<S>& in, int n, ArticulatedInertia<S>& Y, bool with_loads) {
     const BodyTopology& at = model.topology[n];
     Stack& own = stack[at.general];
-    if (own.is_free) return eliminate_free<with_loads>(in, n, Y);
+    if (own.is_free) return eliminate_free(in, n, Y, with_loads);
     const GeneralState<S>& joint = general[at.general];
     Force<S> p = body[n].sum.p;
     const double* armature = model.dof_values(DofProperty::armature).data();
     if (!eliminate(joint, Y, p, armature, in.tau, own.columns)) fail(n);
     if (!with_loads && at.parent < 0) return;
     reduce(joint.n, own.columns, own.c, Y, p);
-    if constexpr (with_loads) keep<GeneralJoint>(n, Y, p);
+    if (with_loads) keep<GeneralJoint>(n, Y, p);
     if (at.parent >= 0) contribute(n, place<GeneralJoint>(n), Y, p);
   }
 
   /// The parent feels nothing but the joint's own forces.
-  template <bool with_loads>
-  void eliminate_free(const SweepInput<S>& in, int n, const ArticulatedInertia<S>& Y) {
+  void eliminate_free(const SweepInput<S>& in, int n, const ArticulatedInertia<S>& Y,
+                      bool with_loads) {
     const BodyTopology& at = model.topology[n];
     const Force<S> tau = to_force(in.tau + at.v);
     if (!eliminate(Y, body[n].sum.p, tau, stack[at.general].free)) fail(n);
     const ArticulatedInertia<S> none{};
-    if constexpr (with_loads) keep<GeneralJoint>(n, none, tau);
+    if (with_loads) keep<GeneralJoint>(n, none, tau);
     if (at.parent >= 0) contribute(n, place<GeneralJoint>(n), none, tau);
   }
 
