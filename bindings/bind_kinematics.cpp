@@ -120,7 +120,7 @@ void bind_poses(nb::module_& m) {
                           });
       },
       "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Poses (..., n_bodies, 4, 4) of the bodies' frames (their joints' outboard frames) in the "
+      "Poses (..., n_joints, 4, 4) of the bodies' frames (their joints' outboard frames) in the "
       "world.");
   m.def(
       "link_poses",

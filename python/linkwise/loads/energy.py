@@ -81,7 +81,7 @@ def energy_balance(run: Run, model: Model | None = None) -> xr.Dataset:
         "dissipated": "dissipated by damping and friction",
         "residual": "energy that does not add up",
         "kinetic_energy": "kinetic energy",
-        "potential_energy": "potential energy of gravity and springs",
+        "potential_energy": "potential energy of gravity, springs and stops",
     }
     data = {
         name: ("time", values, {"long_name": names[name], "units": "J"})

@@ -49,7 +49,7 @@ constexpr QuantityEntry table[] = {
     {"kinetic_energy", "energy", none, Needs::state, true, "J", "kinetic energy", "", "", "",
      [](const Instant& at, double* out) { *out = kinetic_energy(at.model, at.q, at.v); }, nullptr},
     {"potential_energy", "energy", none, Needs::state, true, "J",
-     "potential energy of gravity and springs", "", "", "",
+     "potential energy of gravity, springs and stops", "", "", "",
      [](const Instant& at, double* out) { *out = potential_energy(at.model, at.q); }, nullptr},
     {"steps", "statistics", none, Needs::state, false, "1",
      "accepted integration steps since the start", "", "", "", nullptr,
