@@ -25,7 +25,7 @@ from benchmarks import study
 from benchmarks.machine import Array, random_chain, random_states, read_bodies, write_machine
 
 STEP, STEPS, JOINTS = 1e-3, 1000, 7
-EVALUATIONS = 4  # a step
+EVALUATIONS = 4  # per step
 SLOW = 32  # members that are simulated one by one: more would only take longer
 
 

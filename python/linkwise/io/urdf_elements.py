@@ -11,14 +11,12 @@ from collections import Counter
 from typing import NoReturn
 
 import numpy as np
-import numpy.typing as npt
 from lxml import etree
 
+from linkwise.base import Array
 from linkwise.io.complaint import complain, shorten
 from linkwise.io.numbers import parse_number, parse_numbers
 from linkwise.io.xml import is_foreign, local_name
-
-Array = npt.NDArray[np.float64]
 
 
 def placement(xyz: Array | list[float], rpy: Array | list[float]) -> Array:

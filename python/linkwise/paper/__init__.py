@@ -78,7 +78,7 @@ def reproduce(
 
 
 def _as_text(results: dict[str, Any]) -> str:
-    """JSON with one row of a table a line: small, and still good for diffs."""
+    """JSON with one row of a table per line: small, and still good for diffs."""
 
     def dump(value: Any) -> str:
         return json.dumps(value, allow_nan=False)

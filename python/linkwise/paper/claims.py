@@ -303,9 +303,9 @@ CLAIMS: tuple[tuple[str, Callable[[Results], tuple[str, str]]], ...] = (
         "J-CG needs considerably fewer iterations than the dimension of A (section 6)",
         _below_the_limit,
     ),
-    ("Time of J-CG ~ N^1.12, one degree of freedom a joint, planar chain", _exponent(0)),
-    ("Time of J-CG ~ N^1.12, one degree of freedom a joint, spatial chain", _exponent(1)),
-    ("Time of J-CG ~ N^1.17, two degrees of freedom a joint", _exponent(2)),
+    ("Time of J-CG ~ N^1.12, one degree of freedom per joint, planar chain", _exponent(0)),
+    ("Time of J-CG ~ N^1.12, one degree of freedom per joint, spatial chain", _exponent(1)),
+    ("Time of J-CG ~ N^1.17, two degrees of freedom per joint", _exponent(2)),
     ("The recursive method is O(N) (section 6)", _recursive),
     ("T_P,r increases only marginally with N (section 6)", _marginal_growth),
     (

@@ -35,7 +35,7 @@ STAND_IN_MEAN_ITERATIONS = {
     "sor": (42.0, 51.0),
 }
 
-# Fig. 2(a): CPU time of a solution ~ N^exponent, by degrees of freedom of a joint.
+# Fig. 2(a): CPU time of a solution ~ N^exponent, by degrees of freedom per joint.
 TIME_EXPONENT = {1: 1.12, 2: 1.17}
 
 # Eq. (21): share of the parallel time lost to communication and scheduling.

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from linkwise._core import Model
 
 # A block of samples is held in memory and rewritten when flushed early; a chunk is one file.
-BLOCK_BYTES = 32 << 20
+SAMPLE_BLOCK_BYTES = 32 << 20
 CHUNK_BYTES = 4 << 20
 MAX_BLOCK_ROWS = 4096
 SCALAR_ROWS = 4096
@@ -40,8 +40,8 @@ FLUSH_SECONDS = 2.0
 
 
 def block_rows(schema: Schema, total: int) -> int:
-    """Samples a chunk: many for a small system, few for a large one."""
-    fitting = max(1, BLOCK_BYTES // schema.row_bytes)
+    """Samples per chunk: many for a small system, few for a large one."""
+    fitting = max(1, SAMPLE_BLOCK_BYTES // schema.row_bytes)
     return int(max(1, min(fitting, MAX_BLOCK_ROWS, total)))
 
 

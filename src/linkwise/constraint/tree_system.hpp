@@ -2,9 +2,10 @@
 // Assembles A f = b of [sharf1993, eqs. (10)-(14)] for a tree, and reads motion and loads back from
 // f. With the free accelerations afree_n = M_n^-1 (g_n + known wrenches),
 //     A_nn = B_n^T (M_n^-1 + X_n M_p^-1 X_n^T) B_n + compliance
-//     A_np = -B_n^T X_n M_p^-1 B_p,   A_ns = B_n^T X_n M_p^-1 X_s^T B_s  (siblings: a hub of the
-//     block tree) b_n  = B_n^T (X_n afree_p + c_n - afree_n) + tau / armature
-// Never solves. Bodies enter by their compliance alone.
+//     A_np = -B_n^T X_n M_p^-1 B_p
+//     A_ns = B_n^T X_n M_p^-1 X_s^T B_s
+//     b_n  = B_n^T (X_n afree_p + c_n - afree_n) + tau / armature
+// Siblings n, s are a hub of the block tree. Never solves. Bodies enter by their compliance alone.
 #include <span>
 #include <vector>
 

@@ -102,7 +102,7 @@ constexpr DynamicsEntry table[] = {
      "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)", "walker1982", false,
      false, false, make_recursion<CompositeRigidBody>},
     {"joint_space_conjugate_gradient",
-     "conjugate gradients on the joint-space mass matrix, one inverse dynamics an iteration",
+     "conjugate gradients on the joint-space mass matrix, one inverse dynamics per iteration",
      "lee1988", false, false, false, make_method<JointSpaceConjugateGradient>},
     {"global_projection",
      "all bodies' motion equations projected on what the joints let through, O(N^3)", "hughes1985",

@@ -3,7 +3,7 @@
 //
 // Links joined by welds are one lump, named by its lead, the link nearest to the ground. A massless
 // lump between two joints is no body: its inboard joint is stacked with its outboard one, and the
-// two are one connection of the body that follows (theory: light links).
+// two are one connection of the body that follows (docs/theory/model.md).
 #include <span>
 #include <vector>
 

@@ -1,8 +1,8 @@
 #pragma once
 // The outward pass that every method starts with: for each body the transform from its parent,
 // velocity, velocity-dependent acceleration c and bias wrench
-//     X_n,  v_n = X_n v_p + P_n u_n,  c_n = v_n x (P_n u_n) + ...,  p_n = v_n x* (M_n v_n) -
-//     external
+//     X_n,  v_n = X_n v_p + P_n u_n,  c_n = v_n x (P_n u_n) + ...,
+//     p_n = v_n x* (M_n v_n) - external
 // A stack of elements is walked as if its frames were massless bodies, which gives c_n and the
 // columns of P_n in the body's frame without ever forming dP/dt [featherstone2008, ch. 4].
 #include "linkwise/model/model.hpp"

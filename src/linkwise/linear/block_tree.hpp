@@ -7,8 +7,8 @@
 // dense clique would cost the square of their number, factoring it the cube. A hub keeps the
 // factors instead: with C the body's 6 x 6 compliance at its inboard joint, K the inboard joint's
 // constrained directions and H_i the lever of outboard joint i,
-//     A_is = H_i C H_s^T   (siblings i, s),      A_ip = -H_i C K^T   (joint i with inboard joint
-//     p),
+//     A_is = H_i C H_s^T    (siblings i, s),
+//     A_ip = -H_i C K^T     (joint i with inboard joint p),
 // so that every operation costs O(outboard joints) (compare [baraff1996], which keeps the body's
 // acceleration as an unknown). A chain has no hubs and uses parent_block alone.
 

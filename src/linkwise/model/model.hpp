@@ -5,7 +5,7 @@
 //
 // Two levels of "joint": a user's joint (revolute ... composite) is a stack of elements; a body's
 // inboard connection is the stack of all the joints between it and the nearest inboard body with
-// mass, because a chain of massless links is one composite joint (theory: light links).
+// mass, because a chain of massless links is one composite joint (docs/theory/model.md).
 #include <cstdint>
 #include <memory>
 #include <string>

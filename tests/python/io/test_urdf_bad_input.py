@@ -153,6 +153,14 @@ REPLACED = [
         '<child link="lower"/>',
         '<child link="upper"/>',
         ":26: joint 'slide': link 'upper' is its parent and its child; give it two links",
+        id="a link on itself",
+    ),
+    pytest.param(
+        "</robot>",
+        '<joint name="brace" type="revolute"><parent link="base"/><child link="lower"/></joint>'
+        "</robot>",
+        ":33: joint 'brace' closes a loop of joints 'brace', 'slide' and 'shoulder' at link 'lower'; "
+        "a model is a tree: remove one of these joints",
         id="two parents",
     ),
     pytest.param(

@@ -95,7 +95,7 @@ def test_large_systems_are_cut_along_joints():
         builder.add_joint(f"joint_{k}", "revolute", f"link_{k - 1}", f"link_{k}")
     schema = build_schema(builder.build())
     rows = store.block_rows(schema, 1000)
-    assert 1 <= rows * schema.row_bytes <= store.BLOCK_BYTES
+    assert 1 <= rows * schema.row_bytes <= store.SAMPLE_BLOCK_BYTES
     for variable in schema.variables:
         shape = store.chunk_shape(variable, rows)
         assert np.prod(shape) * 8 <= store.CHUNK_BYTES
