@@ -159,8 +159,8 @@ REPLACED = [
         "</robot>",
         '<joint name="brace" type="revolute"><parent link="base"/><child link="lower"/></joint>'
         "</robot>",
-        ":33: joint 'brace' closes a loop of joints 'brace', 'slide' and 'shoulder' at link 'lower'; "
-        "a model is a tree: remove one of these joints",
+        ":33: joint 'brace' closes a loop of joints 'brace', 'slide' and 'shoulder' at link "
+        "'lower'; a model is a tree: remove one of these joints",
         id="two parents",
     ),
     pytest.param(
