@@ -213,7 +213,7 @@ def short_table(rows: Sequence[Row]) -> str:
             lines.append(["**linkwise**, loads of all joints included", *_cells(mine, machines)])
             batch = [r for r in rows if r.case == "batch" and r.engine == engine]
             if any(r.measured for r in batch):
-                lines.append(["the same, a state of a batch", *_cells(batch, machines)])
+                lines.append(["the same, per state of a batch", *_cells(batch, machines)])
         elif mine:
             python = "" if any(r.arena == CPP for r in mine) else ", from Python"
             lines.append([f"{name}{python}", *_cells(mine, machines)])
