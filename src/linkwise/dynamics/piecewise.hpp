@@ -32,7 +32,8 @@ class Piecewise : public DynamicsMethod {
                           double* loads) override;
   std::span<const double> constraint_force() const override;
 
-  /// A chain of revolute joints without rotors, none prescribed, of at least min_bodies.
+  /// A chain of revolute joints without rotors, none prescribed, of at least min_bodies, all of
+  /// regular inertia.
   static bool suits(const Model& model);
   static constexpr int min_bodies = 16;
   static int pieces(int n_bodies);
