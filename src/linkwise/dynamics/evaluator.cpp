@@ -8,7 +8,9 @@
 #include "linkwise/constraint/joint_constraint.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/parts.hpp"
+#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/forces/passive.hpp"
+#include "linkwise/solve/direct/direct_solver.hpp"
 
 namespace linkwise {
 namespace {
@@ -145,12 +147,11 @@ struct Evaluator::Workspace {
     if (cut < 0) cut = linkwise::is_cut(model);
     return cut > 0;
   }
-  DynamicsMethod& kept_method(const std::string& name, int threads) {
-    if (!method || method_name != name || method_threads != threads) {
-      DynamicsOptions options;
-      options.method = method_name = name;
-      options.threads = method_threads = threads;
-      method = make_dynamics(model, options);
+  /// Made anew only where other options are asked for than at the last call.
+  DynamicsMethod& kept_method(const DynamicsOptions& asked) {
+    if (!method || method_options != asked) {
+      method = make_dynamics(model, asked);
+      method_options = asked;
     }
     return *method;
   }
@@ -159,9 +160,9 @@ struct Evaluator::Workspace {
   BatchEvaluator batch;
   std::unique_ptr<CompositeRigidBody> composite;
   std::unique_ptr<DynamicsMethod> method;
-  std::string method_name;
+  DynamicsOptions method_options;
   Choice choice;
-  int method_threads = 0, cut = -1;
+  int cut = -1;
 };
 
 /// Borrows a workspace and gives it back at the end of its life.
@@ -207,7 +208,10 @@ Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const Dynami
     const Choice& by_default = workspace.default_choice();
     choice.method = alone && is_auto ? by_default.method : "articulated_body";
     if (alone && is_auto) choice.solver = by_default.solver;
-    if (alone) picked.method = &workspace.kept_method(choice.method, options.threads);
+    if (alone)
+      picked.method = &workspace.kept_method(options);
+    else if (options.initial_guess != "zero")
+      choose_dynamics(*model_, options);  // refuses unknown names
     if (forces)
       choice.reason = !is_auto                             ? "as asked for"
                       : choice.method == by_default.method ? by_default.reason
@@ -215,9 +219,8 @@ Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const Dynami
     return picked;
   }
   choice = choose_dynamics(*model_, options);
-  static const SolverOptions usual = evaluation_options().solver_options;
   if (count > 1 && !forces && choice.method == "constraint_force" && choice.solver == "thomas" &&
-      options.solver_options == usual) {
+      !ask_for_refinement(options.solver_options)) {
     require_regular_inertias(*model_);
     picked.on_lanes = BatchMethod::constraint_force;
   } else {
@@ -254,7 +257,8 @@ EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& sta
         n, s.from(m, first), out.acceleration + first * m.nv(),
         out.joint_load ? out.joint_load + first * 6 * m.n_joints() : nullptr, picked.on_lanes));
   };
-  for_each_part(m, count, Executor(options.threads), go_on, [&](size_t first, size_t n) {
+  const Executor executor(checked_threads(options.threads));
+  for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     if (n == count) return part(workspace->batch, first, n);
     Lease own(*this);
     part(own->batch, first, n);

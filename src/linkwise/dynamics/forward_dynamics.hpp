@@ -18,6 +18,8 @@ struct DynamicsOptions {
   std::string initial_guess = "zero";
   int threads = 0;  ///< 0: the default of thread_pool.hpp
   SolverOptions solver_options;
+
+  bool operator==(const DynamicsOptions&) const = default;
 };
 
 /// What an evaluation reports: the solver's report, and where it failed.

@@ -100,6 +100,60 @@ TEST(Evaluator, ThreadsChangeNoBit) {
   EXPECT_EQ(one.loads, three.loads);
 }
 
+// Also on the machines that keep a method from call to call, whatever was asked for before.
+TEST(Evaluator, OptionsReachTheMethodThatAutoStandsFor) {
+  const Model chain = arm(100);
+  const DynamicsCase c(chain, 1);
+  std::vector<double> du(chain.nv());
+  const BatchInput in{c.state.q.data(), c.state.v.data(), c.tau.data()};
+  const Evaluator evaluator(chain);
+  const auto error = [&](const DynamicsOptions& options) {
+    return evaluator.forward_dynamics(1, in, options, {du.data()}, go_on).error_estimate;
+  };
+  DynamicsOptions estimated = asking_for("auto");
+  estimated.solver_options.set("estimate_error", true);
+  EXPECT_EQ(error(asking_for("auto")), 0);
+  EXPECT_GT(error(estimated), 0);
+  EXPECT_EQ(error(asking_for("auto")), 0);
+  for (const size_t count : {size_t{1}, size_t{2}}) {
+    DynamicsOptions unknown = asking_for("auto");
+    unknown.initial_guess = "magic";
+    EXPECT_THROW(Evaluated(chain, count, unknown), InputError);
+    EXPECT_THROW(Evaluated(arm(), count, unknown), InputError);
+  }
+}
+
+// One state after the other, every state is asked about; on lanes, every part.
+TEST(Evaluator, OptionsThatChangeNothingKeepTheLanes) {
+  const Model m = arm();
+  const size_t count = 4;
+  const DynamicsOptions usual = asking_for("constraint_force", "thomas");
+  const Evaluated states(m, count, usual);
+  std::vector<double> du(count * m.nv());
+  const BatchInput in{states.q.data(), states.v.data(), states.tau.data()};
+  const auto times_asked = [&](const DynamicsOptions& options) {
+    int asked = 0;
+    Evaluator(m).forward_dynamics(count, in, options, {du.data()}, [&] { return ++asked > 0; });
+    return asked;
+  };
+  DynamicsOptions given = usual;
+  given.solver_options.set("omega", 1.0);
+  given.solver_options.set("refinement_steps", 0);
+  EXPECT_EQ(times_asked(given), times_asked(usual));
+  EXPECT_EQ(Evaluated(m, count, given).du, states.du);
+  given.solver_options.set("refinement_steps", 1);
+  EXPECT_EQ(times_asked(given), static_cast<int>(count));
+}
+
+// No thread is asked for below one; zero stands for the default.
+TEST(Evaluator, ThreadsAreChecked) {
+  DynamicsOptions options = asking_for("auto");
+  options.threads = 0;
+  EXPECT_TRUE(Evaluated(arm(), 2, options).report.ok());
+  options.threads = -1;
+  EXPECT_THROW(Evaluated(arm(), 2, options), InputError);
+}
+
 TEST(Evaluator, PassiveForcesActWhereAskedFor) {
   Draws draws(32);
   ModelSpec spec = tree_spec(std::vector(3, revolute), chain_parents(3), draws);
