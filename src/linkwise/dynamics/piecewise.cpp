@@ -1,6 +1,7 @@
 #include "linkwise/dynamics/piecewise.hpp"
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/constraint/joint_constraint.hpp"
 #include "linkwise/exec/executor.hpp"
 #include "linkwise/recursion/piece_group.hpp"
 #include "linkwise/solve/registry.hpp"
@@ -221,6 +222,7 @@ class PiecewiseChain {
 };
 
 Piecewise::Piecewise(const Model& model, const DynamicsOptions& options) {
+  require_regular_inertias(model);
   if (!suits(model))
     throw InputError("method piecewise takes a chain of at least " + std::to_string(min_bodies) +
                      " revolute joints without armature, and model '" + model.spec().name + "'" +

@@ -14,7 +14,7 @@ namespace {
 
 enum class Axes { random, parallel, nearly_parallel };
 
-Model make_revolute_chain(int n, Axes axes, unsigned seed) {
+ModelSpec revolute_chain_spec(int n, Axes axes, unsigned seed) {
   std::mt19937 generator(seed);
   std::normal_distribution<double> normal;
   ModelSpec spec;
@@ -37,7 +37,11 @@ Model make_revolute_chain(int n, Axes axes, unsigned seed) {
     spec.links.push_back(link);
     spec.joints.push_back(joint);
   }
-  return Model(spec);
+  return spec;
+}
+
+Model make_revolute_chain(int n, Axes axes, unsigned seed) {
+  return Model(revolute_chain_spec(n, axes, seed));
 }
 
 struct Result {
@@ -120,6 +124,20 @@ TEST(Piecewise, RefusesWhatItCannotTake) {
   const Model model = make_revolute_chain(8, Axes::random, 1);
   EXPECT_FALSE(Piecewise::suits(model));
   EXPECT_THROW(Piecewise(model, {}), InputError);
+}
+
+TEST(Piecewise, NamesTheBodyWithASingularInertia) {
+  ModelSpec spec = revolute_chain_spec(20, Axes::random, 1);
+  spec.links[8].inertia = {};
+  const Model model(spec);
+  EXPECT_FALSE(Piecewise::suits(model));
+  try {
+    Piecewise(model, {});
+    FAIL();
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("body 'link_7' has a singular inertia"), std::string::npos) << text;
+  }
 }
 
 }  // namespace
