@@ -39,7 +39,7 @@ std::string describe(Outcome outcome);
 /// How a simulation, or one member of several, ended.
 struct Ending {
   Outcome outcome = Outcome::converged;
-  double time = 0;   ///< the last one reached
+  double time = 0;   ///< of the evaluation that failed, else the last one reached
   int joint = -1;    ///< where it failed, where that is known
   std::string text;  ///< one line with the remedy; empty for `converged`
 

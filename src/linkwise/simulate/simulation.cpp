@@ -289,11 +289,14 @@ bool Simulation::reach(double t) {
     if (!any_running()) return false;
     Outcome outcome = Outcome::interrupted;
     if (!interrupted_ || !interrupted_()) outcome = integrator_->step(t);
-    if (outcome == Outcome::converged) continue;
+    if (outcome == Outcome::converged) {
+      failure_ = {};  // the step recovered from it
+      continue;
+    }
     // The failure within the step says more than the failure of the step.
-    return end_all(failure_.outcome == outcome
-                       ? failure_
-                       : Ending{outcome, integrator_->time(), failure_.joint, describe(outcome)});
+    if (failure_.outcome == outcome) return end_all(failure_);
+    const int joint = outcome == Outcome::interrupted ? -1 : failure_.joint;
+    return end_all({outcome, integrator_->time(), joint, describe(outcome)});
   }
   return any_running();
 }

@@ -116,7 +116,7 @@ class Simulation : private OdeSystem {
   /// Rows per member: state, the same with given motions, given accelerations, samples.
   std::vector<double> y_, imposed_, given_, du_, loads_, total_;
   std::vector<Ending> endings_;
-  Ending failure_;  ///< of the last evaluation of one member that failed
+  Ending failure_;  ///< of the last evaluation of one member that failed in the present step
   double drift_ = 0;
   long iterations_ = 0;
   bool keeps_trace_ = false;

@@ -88,6 +88,33 @@ TEST(Stops, WhenItIsAskedTo) {
   }
 }
 
+// A failure that the integrator recovered from is over: nothing later is laid to its joint.
+TEST(Stops, AfterARecoveryWithoutAJoint) {
+  const auto model = make_model(pendulum());
+  for (const IntegratorEntry& entry : integrator_registry()) {
+    if (entry.fixed_step) continue;
+    Simulation simulation(model, fixed_step(1e-3, entry.name));
+    bool failed = false;
+    Drive drive;
+    drive.kind = DriveKind::torque_callable;
+    drive.callable = [&](double t, const double*, const double*, double* out) {
+      const bool fails = t > 0.25 && !failed;
+      failed |= fails;
+      *out = fails ? std::numeric_limits<double>::quiet_NaN() : 0;
+    };
+    simulation.set_drive(0, drive);
+    int asked = 0;
+    simulation.set_interrupt([&] { return failed && ++asked > 5; });
+    const double q = 0.5, v = 0;
+    simulation.start(0, &q, &v);
+    run(simulation, {0, 1e9});
+    EXPECT_TRUE(failed);
+    EXPECT_EQ(simulation.ending().outcome, Outcome::interrupted) << entry.name;
+    EXPECT_EQ(simulation.ending().joint, -1) << entry.name;
+    EXPECT_GT(simulation.ending().time, 0.25);
+  }
+}
+
 TEST(Stops, AStartThatIsNotFinite) {
   const auto model = make_model(pendulum());
   for (std::string_view kind : all_kinds()) {
