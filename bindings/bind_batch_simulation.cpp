@@ -30,6 +30,10 @@ nb::tuple simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, n
   const Argument q("q0", {size(m.nq())}, q0), v("v0", {size(m.nv())}, v0),
       torque("tau", {size(m.nv())}, tau), times("times", {}, times_in);
   const size_t members = q.array.shape(0), n = times.array.size(), per = members / all.size();
+  if (members % all.size() != 0)
+    throw InputError("q0 has " + std::to_string(members) + " rows for " +
+                     std::to_string(all.size()) +
+                     " simulations; give each simulation the same number of rows");
   const Start start{rows_of(q, members), rows_of(v, members), rows_of(torque, members)};
   const Columns columns(m, {members, n}, quantities);
   const Executor executor(threads_of(threads, 1 << 20));

@@ -6,6 +6,7 @@ import pytest
 import linkwise as lw
 from helpers.compare import assert_close
 from helpers.random_trees import random_configuration
+from linkwise import _core
 
 QUANTITIES = (
     "position",
@@ -178,3 +179,13 @@ def test_bad_input(changed, message):
         given["wrenches"] = {machine().body_names[-1]: given["wrenches"]["link_6"]}
     with pytest.raises(lw.InputError, match=message):
         lw.simulate_batch(given.pop("model"), **given)
+
+
+def test_members_that_simulations_cannot_share_evenly():
+    model = lw.scenes.chain(2)
+    simulations = [_core.Simulation(model, integrator="runge_kutta_4", step=1e-3) for _ in range(2)]
+    rows = np.zeros((3, model.nv))
+    with pytest.raises(lw.InputError, match="q0 has 3 rows for 2 simulations; give"):
+        _core.simulate_members(
+            simulations, q0=rows, v0=rows, tau=None, times=[0.0], quantities=["position"]
+        )
