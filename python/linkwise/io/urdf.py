@@ -127,6 +127,7 @@ class _Reader:
         self._mimics: dict[str, str] = {}
         self._ignored: Counter[str] = Counter()
         self._found: dict[str, UrdfElement] = {}
+        self._first: dict[str, UrdfElement] = {}  # of those whose name is used again
         for element in root.iterchildren(tag=etree.Element):
             tag = local_name(element)
             if is_foreign(element, root):
@@ -146,7 +147,10 @@ class _Reader:
         found = UrdfElement(self.path, element, f"{kind} '{shorten(name)}'" if name else kind)
         if not name:
             found.fail("has no name", 'add name="..."')
-        self._found[f"{kind} '{name}'"] = found
+        key = f"{kind} '{name}'"
+        if key in self._found:
+            self._first.setdefault(key, self._found[key])
+        self._found[key] = found
         return found
 
     def add_link(self, builder: ModelBuilder, link: UrdfElement) -> None:
@@ -296,6 +300,9 @@ class _Reader:
         elif words and (part := _PARTS.get(words[0])):
             for inner in ("inertial", part):
                 found = found.child(inner) or found
+        if first := self._first.get(element):
+            twice = "the name is used twice"
+            rest = rest.replace(twice, f"{twice} (first on line {first.line})", 1)
         line = f":{found.line}" if found is not None and found.line else ""
         text = shorten(f"{element}{rest}", 2000)
         return InputError(f"{shorten(os.fspath(self.path), 400)}{line}: {text}")

@@ -38,7 +38,7 @@ void check_inertia(const Machine& machine, int l, bool welded, const Inertia<dou
     }
   }
   throw InputError("link '" + link.name + "'" + machine.where +
-                   ": inertia has a negative principal moment (" + std::to_string(principal[0]) +
+                   ": inertia has a negative principal moment (" + number_text(principal[0]) +
                    " kg m2); give a positive semidefinite inertia about the centre of mass");
 }
 

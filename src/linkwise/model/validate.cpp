@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include "linkwise/base/error.hpp"
@@ -30,6 +31,12 @@ int edit_distance(const std::string& a, const std::string& b) {
 }
 
 }  // namespace
+
+std::string number_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
 
 void principal_moments(const Sym3<double>& I, double out[3]) {
   // Trigonometric solution of the characteristic cubic on the scaled matrix.
@@ -82,7 +89,9 @@ void validate_link(const LinkSpec& link, const std::string& where, std::vector<N
     throw InputError("a link" + where + " has an empty name; give every link a name");
   if (!std::isfinite(link.mass))
     throw InputError(head + "mass is not a finite number; give a mass in kg");
-  if (link.mass < 0) throw InputError(head + "mass is negative; give a mass >= 0 in kg");
+  if (link.mass < 0)
+    throw InputError(head + "mass is negative (" + number_text(link.mass) +
+                     "); give a mass >= 0 in kg");
   if (!finite(link.com))
     throw InputError(head + "centre of mass is not finite; give three finite numbers in m");
   for (double x : link.inertia.m)
@@ -163,7 +172,8 @@ void append_dof_properties(const JointSpec& joint, const std::string& where,
       if (std::isnan(x) || (!entry.infinite_ok && std::isinf(x)))
         throw InputError(head + entry.name + " is not a finite number; give a finite value");
       if (!entry.negative_ok && x < 0)
-        throw InputError(head + entry.name + " is negative; give a value >= 0");
+        throw InputError(head + entry.name + " is negative (" + number_text(x) +
+                         "); give a value >= 0");
       dof[p][start + i] = x;
     }
   }
@@ -172,8 +182,10 @@ void append_dof_properties(const JointSpec& joint, const std::string& where,
   for (int k = 0; k < n_joint_elements(joint); ++k)
     quaternion |= info_of(joint_element(joint, k).kind).quaternion >= 0;
   for (int i = 0; i < nv; ++i) {
-    if (at(DofProperty::lower, i) > at(DofProperty::upper, i))
-      throw InputError(head + "lower limit is above the upper limit; swap them");
+    const double lower = at(DofProperty::lower, i), upper = at(DofProperty::upper, i);
+    if (lower > upper)
+      throw InputError(head + "lower limit " + number_text(lower) + " is above the upper limit " +
+                       number_text(upper) + "; swap them");
     if (at(DofProperty::friction, i) > 0 && at(DofProperty::friction_velocity, i) == 0)
       throw InputError(
           head + "friction_velocity is zero; give the speed below which friction is smoothed");

@@ -30,6 +30,9 @@ void validate_joint(JointSpec& joint, const std::string& where);
 void append_dof_properties(const JointSpec& joint, const std::string& where,
                            std::array<std::vector<double>, n_dof_properties>& dof);
 
+/// A number as messages print it: -0.01, not -0.010000.
+std::string number_text(double value);
+
 /// Principal moments, ascending.
 void principal_moments(const Sym3<double>& I, double out[3]);
 

@@ -68,7 +68,7 @@ const Wrong wrong_links[] = {
     {"mass_infinite", [](ModelSpec& s) { s.links[1].mass = infinity; },
      "link 'upper' of arm.urdf: mass is not a finite number; give a mass in kg"},
     {"mass_negative", [](ModelSpec& s) { s.links[1].mass = -1e-9; },
-     "link 'upper' of arm.urdf: mass is negative; give a mass >= 0 in kg"},
+     "link 'upper' of arm.urdf: mass is negative (-1e-09); give a mass >= 0 in kg"},
     {"com_infinite", [](ModelSpec& s) { s.links[1].com.z = -infinity; },
      "link 'upper' of arm.urdf: centre of mass is not finite; give three finite numbers in m"},
     {"inertia_not_a_number", [](ModelSpec& s) { s.links[2].inertia.m[3] = nan; },
@@ -77,7 +77,7 @@ const Wrong wrong_links[] = {
      [](ModelSpec& s) {
        s.links[2].inertia = {{1, 2, 1, 0, 0, 1}};
      },
-     "link 'lower' of arm.urdf: inertia has a negative principal moment (-1.000000 kg m2); give a "
+     "link 'lower' of arm.urdf: inertia has a negative principal moment (-1 kg m2); give a "
      "positive semidefinite inertia about the centre of mass"},
     {"link_name_twice", [](ModelSpec& s) { s.links[2].name = "upper"; },
      "link 'upper' of arm.urdf: the name is used twice; rename one of them"},
@@ -199,11 +199,11 @@ const Wrong wrong_properties[] = {
     {"damping_not_a_number", [](ModelSpec& s) { set_dof(s, 0, DofProperty::damping, {nan}); },
      "joint 'shoulder' of arm.urdf: damping is not a finite number; give a finite value"},
     {"damping_negative", [](ModelSpec& s) { set_dof(s, 0, DofProperty::damping, {-1}); },
-     "joint 'shoulder' of arm.urdf: damping is negative; give a value >= 0"},
+     "joint 'shoulder' of arm.urdf: damping is negative (-1); give a value >= 0"},
     {"armature_infinite", [](ModelSpec& s) { set_dof(s, 0, DofProperty::armature, {infinity}); },
      "joint 'shoulder' of arm.urdf: armature is not a finite number; give a finite value"},
     {"effort_negative", [](ModelSpec& s) { set_dof(s, 0, DofProperty::effort, {-infinity}); },
-     "joint 'shoulder' of arm.urdf: effort is negative; give a value >= 0"},
+     "joint 'shoulder' of arm.urdf: effort is negative (-inf); give a value >= 0"},
     {"limit_not_a_number", [](ModelSpec& s) { set_dof(s, 0, DofProperty::lower, {nan}); },
      "joint 'shoulder' of arm.urdf: lower is not a finite number; give a finite value"},
     {"limits_swapped",
@@ -211,7 +211,7 @@ const Wrong wrong_properties[] = {
        set_dof(s, 0, DofProperty::lower, {1});
        set_dof(s, 0, DofProperty::upper, {-1});
      },
-     "joint 'shoulder' of arm.urdf: lower limit is above the upper limit; swap them"},
+     "joint 'shoulder' of arm.urdf: lower limit 1 is above the upper limit -1; swap them"},
     {"friction_not_smooth",
      [](ModelSpec& s) {
        set_dof(s, 0, DofProperty::friction, {1});

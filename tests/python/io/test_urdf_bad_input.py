@@ -91,7 +91,7 @@ REPLACED = [
     pytest.param(
         '<mass value="2"/>',
         '<mass value="-2"/>',
-        ":7: link 'upper': mass is negative; give a mass >= 0 in kg",
+        ":7: link 'upper': mass is negative (-2); give a mass >= 0 in kg",
         id="negative mass",
     ),
     pytest.param(
@@ -116,13 +116,13 @@ REPLACED = [
     pytest.param(
         'link name="upper"',
         'link name="base"',
-        ":4: link 'base': the name is used twice; rename one of them",
+        ":4: link 'base': the name is used twice (first on line 3); rename one of them",
         id="duplicate link",
     ),
     pytest.param(
         'joint name="slide"',
         'joint name="shoulder"',
-        ":26: joint 'shoulder': the name is used twice; rename one of them",
+        ":26: joint 'shoulder': the name is used twice (first on line 18); rename one of them",
         id="duplicate joint",
     ),
     pytest.param(
@@ -180,19 +180,19 @@ REPLACED = [
     pytest.param(
         'lower="-1" upper="2"',
         'lower="2" upper="-1"',
-        ":23: joint 'shoulder': lower limit is above the upper limit; swap them",
+        ":23: joint 'shoulder': lower limit 2 is above the upper limit -1; swap them",
         id="limits reversed",
     ),
     pytest.param(
         'effort="30"',
         'effort="-30"',
-        ":23: joint 'shoulder': effort is negative; give a value >= 0",
+        ":23: joint 'shoulder': effort is negative (-30); give a value >= 0",
         id="negative effort",
     ),
     pytest.param(
         'damping="0.5"',
         'damping="-0.5"',
-        ":24: joint 'shoulder': damping is negative; give a value >= 0",
+        ":24: joint 'shoulder': damping is negative (-0.5); give a value >= 0",
         id="negative damping",
     ),
     pytest.param(
@@ -250,7 +250,7 @@ def test_cycle_apart_from_the_root(arm, complaint):
 def test_negative_principal_inertia(arm, complaint):
     arm.write_text(arm.read_text().replace('izz="0.01"', 'izz="-0.01"', 1))
     assert complaint(lw.load, arm) == (
-        ":8: link 'upper': inertia has a negative principal moment (-0.010000 kg m2); "
+        ":8: link 'upper': inertia has a negative principal moment (-0.01 kg m2); "
         "give a positive semidefinite inertia about the centre of mass"
     )
 
