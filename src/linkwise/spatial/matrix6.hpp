@@ -31,19 +31,23 @@ LW_INLINE Force<S> to_force(const S* v) {
   return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
 }
 
+/// Entry (i, j) of a Compliance or an ArticulatedInertia.
+template <class L>
+LW_INLINE auto& entry(L& matrix, int i, int j) {
+  if (i < j) std::swap(i, j);
+  return i < 3   ? matrix.A.m[sym_index(i, j)]
+         : j < 3 ? matrix.B.m[3 * j + i - 3]
+                 : matrix.C.m[sym_index(i - 3, j - 3)];
+}
+
 /// Cholesky factor of Y, packed rows with the reciprocal diagonal. False if a pivot of some lane is
 /// not above this part of its diagonal entry.
 template <class S>
 bool factor(const ArticulatedInertia<S>& Y, S* L, double smallest_pivot = 0) {
-  const auto entry = [&](int i, int j) -> S {
-    return i < 3   ? Y.A.m[sym_index(i, j)]
-           : j < 3 ? Y.B.m[3 * j + i - 3]
-                   : Y.C.m[sym_index(i - 3, j - 3)];
-  };
   bool ok = true;
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j <= i; ++j) {
-      const S whole = entry(i, j);
+      const S whole = entry(Y, i, j);
       S x = whole;
       for (int l = 0; l < j; ++l) x = x - L[sym_index(i, l)] * L[sym_index(j, l)];
       if (i == j) {
@@ -136,15 +140,6 @@ LW_INLINE Compliance<S> widen(const Compliance<T>& from) {
 #pragma GCC unroll 9
   for (int i = 0; i < 9; ++i) to.B.m[i] = from.B.m[i] + S{};
   return to;
-}
-
-/// Entry (i, j) of a Compliance.
-template <class L>
-LW_INLINE auto& entry(L& compliance, int i, int j) {
-  if (i < j) std::swap(i, j);
-  return i < 3   ? compliance.A.m[sym_index(i, j)]
-         : j < 3 ? compliance.B.m[3 * j + i - 3]
-                 : compliance.C.m[sym_index(i - 3, j - 3)];
 }
 
 /// Column j: the acceleration that a unit wrench causes.
