@@ -52,12 +52,21 @@ def wait_for(page, holds, what):
     raise AssertionError(f"after {PATIENCE} s: not {what}; {drawn(image)} pixels drawn")
 
 
+# Several pictures drawn: on a slow machine half a second may pass without any.
+NEW_PICTURES = """() => new Promise(done => {
+  let left = 4;
+  const next = () => left-- ? requestAnimationFrame(next) : done();
+  next();
+})"""
+
+
 def still(page):
     """A picture that has stopped changing: the first one fades in."""
     before = wait_for(page, lambda image: drawn(image) > 300, "drawn")
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         time.sleep(0.5)
+        page.evaluate(NEW_PICTURES)
         image = picture(page)
         if np.abs(image - before).max() < 0.02:
             return image
