@@ -69,9 +69,9 @@ def test_an_addition_takes_as_many_files_as_promised(patch, changed):
     assert len(files) == promised()[patch.stem], files
     root = changed(patch)
     sources = [name for name in files if name.startswith("src/") and name.endswith(".cpp")]
-    if COMPILER:
-        for source in sources:
-            run(COMPILER, *FLAGS, "-I", "src", source, cwd=root)
+    assert COMPILER or not sources, "no C++ compiler; set CXX, or install g++"
+    for source in sources:
+        run(COMPILER, *FLAGS, "-I", "src", source, cwd=root)
     for name in files:
         if name.endswith(".py"):
             run(sys.executable, "-m", "py_compile", name, cwd=root)
