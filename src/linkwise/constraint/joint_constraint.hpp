@@ -26,11 +26,12 @@ struct JointConstraint {
 };
 
 /// InputError naming the first body whose inertia is singular: it has no compliance.
-inline void require_regular_inertias(const Model& model) {
+inline void require_regular_inertias(const Model& model, const char* method = "constraint_force") {
   if (const int body = model.singular_body(); body >= 0)
-    throw InputError("body '" + model.body_name(body) + "'" + model.where() +
-                     " has a singular inertia, which method constraint_force cannot take; give it "
-                     "mass and inertia about every axis, or use method articulated_body");
+    throw InputError(
+        "body '" + model.body_name(body) + "'" + model.where() +
+        " has a singular inertia, which method " + method +
+        " cannot take; give it mass and inertia about every axis, or use method articulated_body");
 }
 
 /// Columns of B of body n: what its joint constrains or drives through a rotor.

@@ -222,7 +222,7 @@ class PiecewiseChain {
 };
 
 Piecewise::Piecewise(const Model& model, const DynamicsOptions& options) {
-  require_regular_inertias(model);
+  require_regular_inertias(model, "piecewise");
   if (!suits(model))
     throw InputError("method piecewise takes a chain of at least " + std::to_string(min_bodies) +
                      " revolute joints without armature, and model '" + model.spec().name + "'" +
