@@ -32,20 +32,25 @@ if TYPE_CHECKING:
     from linkwise.scenario import Scenario
 
 
-class SimulationError(RuntimeError):
+class _Stopped(BaseException):
+    """A simulation that ended early, with the run until then; pickles and copies whole."""
+
+    def __init__(self, message: str, run: Run) -> None:
+        super().__init__(message)
+        self.run = run
+
+    def __reduce__(self) -> tuple[type[_Stopped], tuple[str, Run]]:
+        # Exceptions are rebuilt from `args`, which is what they print: the message alone. One that
+        # cannot be rebuilt ends the thread of a process pool that reads it, and the pool hangs.
+        return type(self), (str(self), self.run)
+
+
+class SimulationError(_Stopped, RuntimeError):
     """A simulation that could not go on; `run` holds everything until then."""
 
-    def __init__(self, message: str, run: Run) -> None:
-        super().__init__(message)
-        self.run = run
 
-
-class SimulationInterrupted(KeyboardInterrupt):
+class SimulationInterrupted(_Stopped, KeyboardInterrupt):
     """Ctrl-C during a simulation; `run` holds everything until then."""
-
-    def __init__(self, message: str, run: Run) -> None:
-        super().__init__(message)
-        self.run = run
 
 
 def check_driven(
