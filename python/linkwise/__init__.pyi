@@ -48,9 +48,9 @@ from linkwise.results import open_run as open_run
 from linkwise.scenario import load_scenario as load_scenario
 from linkwise.simulation.batch import simulate_batch as simulate_batch
 from linkwise.simulation.numerics import Numerics as Numerics
+from linkwise.simulation.scenarios import run_scenario as run_scenario
 from linkwise.simulation.simulate import SimulationError as SimulationError
 from linkwise.simulation.simulate import SimulationInterrupted as SimulationInterrupted
-from linkwise.simulation.simulate import run_scenario as run_scenario
 from linkwise.simulation.simulate import simulate as simulate
 from linkwise.simulation.sweep import sweep as sweep
 from linkwise.simulation.time_loop import Progress as Progress

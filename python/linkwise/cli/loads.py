@@ -60,8 +60,8 @@ def loads(
 ) -> None:
     """Peak loads of every joint of a RUN: with bounds, by cause, against ratings."""
     from linkwise.io.load import load
+    from linkwise.loads.samples import joint_position
     from linkwise.results import open_run
-    from linkwise.results.samples import joint_position
 
     opened = open_run(run)
     for name in joint or ():

@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.loads.fatigue import damage_equivalent
+from linkwise.loads.peaks import envelope
 from linkwise.plot.report_figures import energy_figure, joint_figures, packed
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 # Joints with figures, the most loaded first: each takes some 200 kB.
 MOST_JOINTS = 16
@@ -127,9 +129,7 @@ def _margin_table(summary: xr.Dataset, left: xr.Dataset, limits: xr.Dataset | No
     return _table(["joint", "quantity", "peak", "rating", "use", "margin"], ordered, "named")
 
 
-def _envelope_table(run: Run) -> str:
-    from linkwise.loads.peaks import envelope
-
+def _envelope_table(run: RunLike) -> str:
     found = envelope(run)
     components = [str(c) for c in found["component"].values]
     headings = ["joint", *(f"{c} [{'N' if c[0] == 'f' else 'N m'}]" for c in components)]
@@ -146,9 +146,7 @@ def _envelope_table(run: Run) -> str:
     return _table(headings, rows)
 
 
-def _fatigue_table(run: Run, joints: list[str]) -> str:
-    from linkwise.loads.fatigue import damage_equivalent
-
+def _fatigue_table(run: RunLike, joints: list[str]) -> str:
     found = damage_equivalent(run, joints=joints)
     components = [str(c) for c in found["component"].values]
     rows = [
@@ -165,7 +163,7 @@ def _fatigue_table(run: Run, joints: list[str]) -> str:
     return _table(["joint", "exponent m", *components], rows)
 
 
-def _health(run: Run, limits: xr.Dataset | None) -> str:
+def _health(run: RunLike, limits: xr.Dataset | None) -> str:
     attrs = run.dataset.attrs
     options = json.loads(attrs.get("options", "{}"))
     facts = [
@@ -207,7 +205,7 @@ def script_json(value: Any) -> str:
 
 
 def write_report(
-    run: Run, path: str | os.PathLike[str], found: dict[str, Any], model: Model | None = None
+    run: RunLike, path: str | os.PathLike[str], found: dict[str, Any], model: Model | None = None
 ) -> Path:
     """Write the report of a run.
 
