@@ -28,7 +28,7 @@ _AXES = {
 
 def _frames(model: Model, q: Array) -> tuple[Array, Array]:
     """Poses (time, joint, 4, 4) of the joints' frames and of their inboard bodies' frames."""
-    child = _core.body_poses(model, q)
+    child = _core.joint_poses(model, q)
     inboard = np.asarray(model.joint_parents)
     parent = child[:, np.maximum(inboard, 0)]
     parent[:, inboard < 0] = np.eye(4)

@@ -146,7 +146,7 @@ def external(run: RunLike, model: Model, where: slice | Sequence[int]) -> Array 
             raise InputError('run holds no external_wrench; record the quantity "external_wrench"')
         return None
     given = run.dataset["external_wrench"]
-    bodies = {name: k for k, name in enumerate(model.body_names)}
+    bodies = {name: k for k, name in enumerate(model.child_link_names)}
     values = rows(run, "external_wrench", where)
     whole = np.zeros((len(values), model.n_joints, 6))
     whole[:, [bodies[str(name)] for name in given["wrenched_body"].values]] = values

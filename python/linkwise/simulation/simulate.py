@@ -63,10 +63,11 @@ def check_driven(
             by_joint[joint] = as_drive(drive)
         except InputError as error:
             raise InputError(f"drives[{joint!r}]: {error}") from None
-    bodies = {*model.body_names, *model.link_names} if wrenches else set()
+    bodies = {*model.child_link_names, *model.link_names} if wrenches else set()
     for body, wrench in (wrenches or {}).items():
         if body not in bodies:
-            raise InputError(f"wrenches: unknown body {body!r}; {near(body, model.body_names)}")
+            known = near(body, model.child_link_names)
+            raise InputError(f"wrenches: unknown body {body!r}; {known}")
         try:
             by_body[body] = as_wrench(wrench)
         except InputError as error:

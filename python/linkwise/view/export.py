@@ -145,10 +145,10 @@ def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
     A body is named after one of its links, whose frame is the joint's in most files: two frames of
     one rigid body that agree in one position agree in all.
     """
-    links, joints = _core.link_poses(model, q), _core.body_poses(model, q)
+    links, joints = _core.link_poses(model, q), _core.joint_poses(model, q)
     index = {name: k for k, name in enumerate(model.link_names)}
     found = np.full(len(links), -1)
-    for joint, body in enumerate(model.body_names):
+    for joint, body in enumerate(model.child_link_names):
         if np.array_equal(links[index[body]], joints[joint]):
             found[index[body]] = joint
     others = np.flatnonzero(found < 0)
@@ -158,7 +158,7 @@ def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
 
 def _poses(model: Model, q: Array, link_poses: npt.NDArray[np.int64]) -> Array:
     links = _core.link_poses(model, q)[link_poses >= model.n_joints]
-    frames = np.concatenate([_core.body_poses(model, q), links])
+    frames = np.concatenate([_core.joint_poses(model, q), links])
     return np.concatenate([frames[:, :3, 3], quaternions(frames[:, :3, :3])], axis=1)
 
 
