@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.io.writing import check_file, write_text
 from linkwise.loads.fatigue import damage_equivalent
 from linkwise.loads.peaks import envelope
 from linkwise.plot.report_figures import energy_figure, joint_figures, packed
@@ -216,7 +217,8 @@ def write_report(
         model: The machine, if the run does not hold it.
     """
     plotly = _plotly()
-    target = Path(path)
+    target = Path(os.path.abspath(path))
+    check_file(target)
     summary, limits, left = found["summary"], found.get("bounds"), found.get("margins")
     names = [str(name) for name in summary["joint"].values]
     force = summary["peak"].sel(quantity="force").values
@@ -259,8 +261,5 @@ def write_report(
         f"<script type='application/json' id='figures'>{script_json(content)}</script>",
         f"<script>{plotly.offline.get_plotlyjs()}</script><script>{_SCRIPT}</script></body></html>\n",
     ]
-    try:
-        target.write_text("".join(parts), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{str(path)!r}: cannot write it ({error.strerror})") from None
+    write_text(target, "".join(parts))
     return target
