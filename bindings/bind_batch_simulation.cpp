@@ -29,19 +29,19 @@ nb::tuple simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, n
   const Model& m = all[0]->model();
   const Argument q("q0", {size(m.nq())}, q0), v("v0", {size(m.nv())}, v0),
       torque("tau", {size(m.nv())}, tau), times("times", {}, times_in);
-  const size_t members = q.array.shape(0), n = times.array.size(), per = members / all.size();
+  const size_t members = q.array.shape(0), n = times.array.size();
   if (members % all.size() != 0)
     throw InputError("q0 has " + std::to_string(members) + " rows for " +
                      std::to_string(all.size()) +
                      " simulations; give each simulation the same number of rows");
-  const Start start{rows_of(q, members), rows_of(v, members), rows_of(torque, members)};
+  const Start start{rows_of(q, members), rows_of(v, members), rows_of(torque, members), members};
   const Columns columns(m, {members, n}, quantities);
   const Executor executor(threads_of(threads, 1 << 20));
   Interrupt interrupt;
   std::vector<Ending> endings;
   {
     const nb::gil_scoped_release release;
-    endings = simulate_batch(all, per, start, {times.data, n}, columns.sample, executor,
+    endings = simulate_batch(all, start, {times.data, n}, columns.sample, executor,
                              [&interrupt] { return !interrupt(); });
   }
   const bool interrupted = interrupt.was_keyboard();

@@ -112,17 +112,16 @@ int joint_of(const PyModel& self, nb::handle body) {
 
 void bind_poses(nb::module_& m) {
   m.def(
-      "joint_poses",
+      "body_poses",
       [](const PyModel& self, nb::handle q, nb::handle threads) {
         return map_states(self, q, nb::none(), threads, {size(self.model->n_joints()), 4, 4},
                           [](const Model& m, const double* q, const double*, double* out) {
-                            joint_poses(m, q, out);
+                            body_poses(m, q, out);
                           });
       },
       "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Poses (..., n_joints, 4, 4) of the joint frames, each fixed in its joint's child link: 4 x "
-      "4 "
-      "matrices that take points of that frame to the world, m.");
+      "Poses (..., n_joints, 4, 4) of the bodies' frames (their joints' outboard frames) in the "
+      "world.");
   m.def(
       "link_poses",
       [](const PyModel& self, nb::handle q, nb::handle threads) {

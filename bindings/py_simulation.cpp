@@ -223,7 +223,7 @@ void PySimulation::start(double t0, nb::handle q, nb::handle v) {
     throw InputError("q0 must have shape (" + std::to_string(model->nq()) + ",)");
   if (!v0.given || v0.array.ndim() != 1)
     throw InputError("v0 must have shape (" + std::to_string(model->nv()) + ",)");
-  simulation.start(t0, q0.data, v0.data);
+  simulation.start(t0, {q0.data, v0.data});
 }
 
 }  // namespace linkwise::bindings

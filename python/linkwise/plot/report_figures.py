@@ -17,14 +17,13 @@ import numpy.typing as npt
 from linkwise._core import InputError
 from linkwise.base import HALVES, Array
 from linkwise.loads.causes import Split, along_total
-from linkwise.loads.energy import energy_balance
 from linkwise.loads.engineering import derive, joint_directions
 from linkwise.loads.fatigue import load_duration, spectrum
-from linkwise.loads.samples import blocks, joint_names, model_of, rows, select
+from linkwise.results.samples import blocks, joint_names, model_of, rows, select
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-    from linkwise.loads.samples import RunLike
+    from linkwise.results import Run
 
 Figure = dict[str, Any]
 TIMES = "times"
@@ -123,7 +122,7 @@ def _polar(load: Array, direction: Array) -> Figure:
     }
 
 
-def _spectra(run: RunLike, joint: str, half: int) -> Figure:
+def _spectra(run: Run, joint: str, half: int) -> Figure:
     data = []
     kind, unit, components = HALVES[half]
     for component in components:
@@ -137,7 +136,7 @@ def _spectra(run: RunLike, joint: str, half: int) -> Figure:
     return {"data": data, "layout": layout}
 
 
-def _duration(run: RunLike, joint: str, model: Model) -> Figure:
+def _duration(run: Run, joint: str, model: Model) -> Figure:
     found = load_duration(run, joint, "force", model=model)
     trace = {
         "type": "bar",
@@ -149,7 +148,7 @@ def _duration(run: RunLike, joint: str, model: Model) -> Figure:
 
 
 def joint_figures(
-    run: RunLike, joints: list[str], every: int, model: Model | None
+    run: Run, joints: list[str], every: int, model: Model | None
 ) -> dict[str, list[Figure]]:
     """The figures of each joint, drawing one sample of `every`."""
     machine = model_of(run, model)
@@ -193,7 +192,7 @@ def _engineering(load: Array, direction: Array, half: int) -> Figure:
 
 
 def _thinned_shares(
-    run: RunLike, model: Model, every: int, where: list[int]
+    run: Run, model: Model, every: int, where: list[int]
 ) -> tuple[Array | None, list[str]]:
     try:
         split = Split(run, "force", model)
@@ -206,8 +205,10 @@ def _thinned_shares(
     return np.concatenate(parts), split.names
 
 
-def energy_figure(run: RunLike, every: int, model: Model | None) -> list[Figure]:
+def energy_figure(run: Run, every: int, model: Model | None) -> list[Figure]:
     """Energies and works, and what does not add up; nothing for runs without energies."""
+    from linkwise.loads.energy import energy_balance
+
     try:
         balance = energy_balance(run, model)
     except InputError:
@@ -225,7 +226,7 @@ def energy_figure(run: RunLike, every: int, model: Model | None) -> list[Figure]
     ]
 
 
-def _steps(run: RunLike, every: int) -> Figure:
+def _steps(run: Run, every: int) -> Figure:
     layout = _layout("Integration step", "time [s]", "step [s]")
     layout["yaxis"]["type"] = "log"
     steps = run.dataset["step_size"].values[::every]

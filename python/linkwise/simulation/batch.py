@@ -167,7 +167,7 @@ def simulate_batch(
     simulations = []
     for one in models:
         by_joint, by_body = check_driven(one, drives, wrenches)
-        simulation = _core.Simulation(one, **options)
+        simulation = _core.Simulation(one, **options, method="articulated_body", threads=1)
         set_driven(simulation, one, by_joint, by_body, float(sampled[-1]))
         simulations.append(simulation)
     lead, rows = _members(given, len(models))

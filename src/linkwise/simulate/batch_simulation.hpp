@@ -11,17 +11,14 @@
 
 namespace linkwise {
 
-/// InputError where a setup has what members cannot share: an integrator that chooses its steps,
-/// functions of Python as drives.
-void check_members(const Setup& setup);
-
-/// Simulates from time 0 on. Model, drives, wrenches and integrator are those of the simulations,
-/// each of which has `per_simulation` members; the method is articulated_body. Arrays of `samples`
-/// are [member][time][...], NaN after a member's end: a member that fails ends alone. `go_on` is
-/// asked at every step, from any thread; once it is false, members under way end as `interrupted`.
+/// Simulates from time 0 on. Model, drives, wrenches and numerics are those of the simulations,
+/// which check_members() must take and which share the members of the start equally. Arrays of
+/// `samples` are [member][time][...], NaN after a member's end: a member that fails ends alone.
+/// `go_on` is asked at every step, from any thread; once it is false, members under way end as
+/// `interrupted`.
 std::vector<Ending> simulate_batch(std::span<const Simulation* const> simulations,
-                                   size_t per_simulation, const Start& start,
-                                   std::span<const double> times, const Sample& samples,
-                                   const Executor& executor, const std::function<bool()>& go_on);
+                                   const Start& start, std::span<const double> times,
+                                   const Sample& samples, const Executor& executor,
+                                   const std::function<bool()>& go_on);
 
 }  // namespace linkwise

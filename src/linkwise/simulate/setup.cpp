@@ -28,10 +28,53 @@ Setup::Setup(std::shared_ptr<const Model> model_, SimulationOptions options_)
   check_integrator(options.integrator, options.integration);
 }
 
+void Setup::set_drive(int joint, Drive drive) {
+  const JointInfo& info = model->joints[joint];
+  const bool is_motion = drive.kind == DriveKind::motion;
+  if ((drive.kind == DriveKind::pd || is_motion) && info.nq != info.nv)
+    throw InputError("joint '" + info.name + "'" + model->where() + ": a " +
+                     (is_motion ? "motion" : "pd") +
+                     " drive needs angles or distances, not a quaternion; drive it by torque");
+  drives[joint] = std::move(drive);
+  settled_ = false;
+}
+
+void Setup::add_wrench(Wrench wrench) {
+  const JointInfo& info = model->joints[wrench.joint];
+  if (!info.last_of_body)
+    throw InputError(
+        "body '" + model->links[info.link].name + "'" + model->where() +
+        " has no mass, so no wrench can act on it; apply it to the next body outboard");
+  wrenches.push_back(std::move(wrench));
+}
+
 void Setup::settle() {
+  if (settled_) return;
   any_motion_ = false;
   for (const Drive& drive : drives) any_motion_ |= drive.kind == DriveKind::motion;
+  if (any_motion_ && options.state == StateChoice::body_velocities)
+    throw InputError(
+        "state body_velocities takes no motion drives; use the state joint_rates for them");
   driven_ = driven_model(*model, drives);
+  settled_ = true;
+}
+
+void check_members(const Setup& setup) {
+  const SimulationOptions& options = setup.options;
+  if (options.dynamics.method != "articulated_body")
+    throw InputError("method '" + options.dynamics.method + "': a batch takes articulated_body");
+  if (options.state != StateChoice::joint_rates)
+    throw InputError("state body_velocities: a batch takes joint_rates");
+  if (!find_integrator(options.integrator).fixed_step)
+    throw InputError("integrator '" + options.integrator +
+                     "' chooses its own steps; a batch takes " + fixed_step_names());
+  for (size_t j = 0; j < setup.drives.size(); ++j)
+    if (setup.drives[j].callable || setup.drives[j].motion)
+      throw InputError("drives['" + setup.model->joints[j].name +
+                       "'] is a function; a batch takes numbers and tables");
+  for (const Wrench& wrench : setup.wrenches)
+    if (wrench.callable)
+      throw InputError("wrenches: a function is given; a batch takes numbers and tables");
 }
 
 }  // namespace linkwise

@@ -1,6 +1,7 @@
 #pragma once
 // What all members of a simulation have in common: the machine, what drives it, and the numerics.
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "linkwise/dynamics/forward_dynamics.hpp"
@@ -35,11 +36,15 @@ struct Setup {
   std::shared_ptr<const Model> model;  ///< as the user sees it
   SimulationOptions options;
   Choice choice;
-  std::vector<Drive> drives;  ///< one per joint
+  std::vector<Drive> drives;  ///< one per joint; changed by set_drive()
   std::vector<Wrench> wrenches;
 
-  /// Computes what follows from the drives. Call it before the first start, and after a drive has
-  /// changed.
+  /// InputError where the joint takes no such drive, or the body no wrench.
+  void set_drive(int joint, Drive drive);
+  void add_wrench(Wrench wrench);
+
+  /// Computes what follows from the drives, where one has changed. Simulations that share a setup
+  /// call it from several threads: settle it before.
   void settle();
   /// The model with the joints of given motion prescribed.
   const Model& driven() const { return driven_ ? *driven_ : *model; }
@@ -48,7 +53,11 @@ struct Setup {
 
  private:
   std::unique_ptr<const Model> driven_;
-  bool any_motion_ = false;
+  bool any_motion_ = false, settled_ = false;
 };
+
+/// InputError where a setup has what several members cannot share. They are computed by
+/// articulated_body in fixed steps, and functions of Python are asked for one member alone.
+void check_members(const Setup& setup);
 
 }  // namespace linkwise

@@ -23,60 +23,12 @@ Simulation::Simulation(std::shared_ptr<const Model> model, SimulationOptions opt
 Simulation::Simulation(std::shared_ptr<Setup> setup) : setup_(std::move(setup)), endings_(1) {}
 Simulation::~Simulation() = default;
 
-void Simulation::set_drive(int joint, Drive drive) {
-  const JointInfo& info = model().joints[joint];
-  const bool is_motion = drive.kind == DriveKind::motion;
-  if ((drive.kind == DriveKind::pd || is_motion) && info.nq != info.nv)
-    throw InputError("joint '" + info.name + "'" + model().where() + ": a " +
-                     (is_motion ? "motion" : "pd") +
-                     " drive needs angles or distances, not a quaternion; drive it by torque");
-  setup_->drives[joint] = std::move(drive);
-}
-
-void Simulation::add_wrench(Wrench wrench) {
-  const JointInfo& info = model().joints[wrench.joint];
-  if (!info.last_of_body)
-    throw InputError(
-        "body '" + model().links[info.link].name + "'" + model().where() +
-        " has no mass, so no wrench can act on it; apply it to the next body outboard");
-  setup_->wrenches.push_back(std::move(wrench));
-}
-
-void Simulation::start(double t0, const double* q0, const double* v0) {
-  setup_->settle();
-  const SimulationOptions& options = setup_->options;
-  if (setup_->any_motion() && options.state == StateChoice::body_velocities)
-    throw InputError(
-        "state body_velocities takes no motion drives; use the state joint_rates for them");
-  DynamicsOptions integrated = options.dynamics;
-  solver_tolerance_.reset();
-  if (follows_error_test()) {
-    const IntegratorOptions& o = options.integration;
-    solver_tolerance_ = std::make_unique<SolverTolerance>(
-        setup_->driven(), o.relative_tolerance > 0 ? o.relative_tolerance : o.tolerance,
-        o.absolute_tolerance > 0 ? o.absolute_tolerance : o.tolerance,
-        options.dynamics.solver_options.tolerance);
-    integrated.solver_options.energy_bound = solver_tolerance_->bound();
-    solver_tolerance_->start(t0);
-  }
-  method_ = make_dynamics(setup_->driven(), integrated);
-  output_method_ = make_dynamics(setup_->driven(), options.dynamics);
-  members_ = 1;
-  lanes_.reset();
-  begin(t0, {q0, v0, nullptr});
-}
-
-void Simulation::start_members(double t0, size_t members, const Start& start) {
-  members_ = members;
-  method_.reset();
-  output_method_.reset();
-  solver_tolerance_.reset();
-  lanes_ = std::make_unique<BatchEvaluator>(setup_->driven());
-  begin(t0, start);
-}
-
-void Simulation::begin(double t0, const Start& start) {
+void Simulation::start(double t0, const Start& start) {
   const Model& m = model();
+  members_ = start.members;
+  if (members_ > 1) check_members(*setup_);
+  setup_->settle();
+  make_methods(t0);
   for (size_t i = 0; i < members_; ++i) check_locked_joints(m, setup_->drives, start.v + i * nv());
   forces_.emplace(*setup_, members_, start.tau);
   inverse_.reset();
@@ -98,6 +50,30 @@ void Simulation::begin(double t0, const Start& start) {
   }
   integrator_ = make_integrator(setup_->options.integrator, *system, setup_->options.integration);
   integrator_->start(t0, body_velocities_ ? body_velocities_->start() : y_);
+}
+
+void Simulation::make_methods(double t0) {
+  method_.reset();
+  output_method_.reset();
+  solver_tolerance_.reset();
+  lanes_.reset();
+  if (members_ > 1) {
+    lanes_ = std::make_unique<BatchEvaluator>(setup_->driven());
+    return;
+  }
+  const SimulationOptions& options = setup_->options;
+  DynamicsOptions integrated = options.dynamics;
+  if (follows_error_test()) {
+    const IntegratorOptions& o = options.integration;
+    solver_tolerance_ = std::make_unique<SolverTolerance>(
+        setup_->driven(), o.relative_tolerance > 0 ? o.relative_tolerance : o.tolerance,
+        o.absolute_tolerance > 0 ? o.absolute_tolerance : o.tolerance,
+        options.dynamics.solver_options.tolerance);
+    integrated.solver_options.energy_bound = solver_tolerance_->bound();
+    solver_tolerance_->start(t0);
+  }
+  method_ = make_dynamics(setup_->driven(), integrated);
+  output_method_ = make_dynamics(setup_->driven(), options.dynamics);
 }
 
 bool Simulation::follows_error_test() const {

@@ -26,6 +26,7 @@ struct EvaluationTrace {
 struct Start {
   const double *q = nullptr, *v = nullptr;
   const double* tau = nullptr;  ///< constant, beside the drives; null: none
+  size_t members = 1;
 };
 
 class Simulation : private OdeSystem {
@@ -35,15 +36,13 @@ class Simulation : private OdeSystem {
   explicit Simulation(std::shared_ptr<Setup> setup);
   ~Simulation();
 
-  void set_drive(int joint, Drive drive);
-  void add_wrench(Wrench wrench);
+  void set_drive(int joint, Drive drive) { setup_->set_drive(joint, std::move(drive)); }
+  void add_wrench(Wrench wrench) { setup_->add_wrench(std::move(wrench)); }
 
   /// Fixes the drives and starts at t0. Rates of locked joints must be zero; the state of joints
-  /// with a motion drive is that of the motion, whatever q0 and v0 say.
-  void start(double t0, const double* q0, const double* v0);
-  /// The same with many members by articulated_body on lanes, for a setup that check_members()
-  /// takes and that is settled.
-  void start_members(double t0, size_t members, const Start& start);
+  /// with a motion drive is that of the motion, whatever the start says. One member is computed by
+  /// the method of the options, several share lanes: see check_members().
+  void start(double t0, const Start& start);
 
   /// Steps until t is covered, then writes the sample there, NaN for members that have ended. False
   /// when all have: see ending().
@@ -83,7 +82,7 @@ class Simulation : private OdeSystem {
   void normalise(double* y) override;
   void accepted(double t, const double* y) override;
 
-  void begin(double t0, const Start& start);
+  void make_methods(double t0);
   bool follows_error_test() const;
   SweepInput<double> input(double t, const double* q, const double* v);
   BatchInput rows(const double* y, size_t member) const;

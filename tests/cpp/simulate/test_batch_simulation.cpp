@@ -13,6 +13,11 @@ namespace {
 
 using enum JointType;
 
+/// The one method of batches.
+SimulationOptions steps_of(double step, std::string_view kind = "runge_kutta_4") {
+  return with(fixed_step(step, kind), {"articulated_body", StateChoice::joint_rates});
+}
+
 constexpr auto go_on = [] { return true; };
 
 /// Initial states and torques of several members, and everything that is recorded of them.
@@ -36,7 +41,7 @@ struct Members {
     kinetic.assign(count * times, 7);
     potential.assign(count * times, 7);
   }
-  Start start() const { return {q.data(), v.data(), tau.data()}; }
+  Start start() const { return {q.data(), v.data(), tau.data(), count}; }
   Sample samples() {
     Sample out;
     out["position"] = position.data();
@@ -98,8 +103,7 @@ TEST_P(BatchSimulation, EqualsOneByOne) {
   const auto model = make_model(every_kind());
   const std::vector<double> times = {0, 0.0137, 0.1};
   for (std::string_view kind : {"runge_kutta_4", "semi_implicit_euler"}) {
-    const SimulationOptions options =
-        with(fixed_step(1e-3, kind), {"articulated_body", StateChoice::joint_rates});
+    const SimulationOptions options = steps_of(1e-3, kind);
     Simulation shared(model, options);
     drive(shared, GetParam());
     for (size_t count = 1; count <= 2 * native_lanes + 1; ++count) {
@@ -108,7 +112,7 @@ TEST_P(BatchSimulation, EqualsOneByOne) {
         members.tau[i * model->nv()] = members.tau[(i + 1) * model->nv() - 1] = 0;
       const Simulation* const all[] = {&shared};
       const auto ends =
-          simulate_batch(all, count, members.start(), times, members.samples(), Executor(1), go_on);
+          simulate_batch(all, members.start(), times, members.samples(), Executor(1), go_on);
       for (size_t i = 0; i < count; ++i) {
         EXPECT_EQ(ends[i].outcome, Outcome::converged);
         EXPECT_EQ(ends[i].time, 0.1);
@@ -125,7 +129,7 @@ TEST_P(BatchSimulation, EqualsOneByOne) {
           torque.value = {first, first + info.nv};
           alone.set_drive(j, torque);
         }
-        alone.start(0, q.data(), v.data());
+        alone.start(0, {q.data(), v.data()});
         const auto want = run(alone, times);
         ASSERT_EQ(want.size(), times.size());
         for (size_t k = 0; k < times.size(); ++k) {
@@ -151,19 +155,19 @@ TEST(BatchSimulation, SeveralModels) {
   ModelSpec heavy_spec = every_kind();
   heavy_spec.links.back().mass += 3;
   const auto light = make_model(every_kind()), heavy = make_model(heavy_spec);
-  Simulation one(light, fixed_step(1e-2)), other(heavy, fixed_step(1e-2));
+  Simulation one(light, steps_of(1e-2)), other(heavy, steps_of(1e-2));
   const Simulation* const both[] = {&one, &other};
   const std::vector<double> times = {0.1};
   const size_t per = native_lanes + 1;
   Members together(*light, 2 * per, 1);
-  simulate_batch(both, per, together.start(), times, together.samples(), Executor(2), go_on);
+  simulate_batch(both, together.start(), times, together.samples(), Executor(2), go_on);
   for (size_t m = 0; m < 2; ++m) {
     Members apart(*light, per, 1);
     const Start start{together.q.data() + m * per * light->nq(),
                       together.v.data() + m * per * light->nv(),
-                      together.tau.data() + m * per * light->nv()};
+                      together.tau.data() + m * per * light->nv(), per};
     const Simulation* const single[] = {both[m]};
-    simulate_batch(single, per, start, times, apart.samples(), Executor(1), go_on);
+    simulate_batch(single, start, times, apart.samples(), Executor(1), go_on);
     const auto first = together.load.begin() + m * apart.load.size();
     EXPECT_EQ(apart.load, std::vector<double>(first, first + apart.load.size()));
   }
@@ -171,15 +175,14 @@ TEST(BatchSimulation, SeveralModels) {
 
 TEST(BatchSimulationThreads, SameBits) {
   const auto model = make_model(every_kind());
-  Simulation shared(model, fixed_step(1e-2));
+  Simulation shared(model, steps_of(1e-2));
   drive(shared, false);
   const Simulation* const all[] = {&shared};
   const std::vector<double> times = {0, 0.05, 0.2};
   std::vector<double> first;
   for (int threads : {1, 1, 2, 3, 7}) {
     Members members(*model, 5 * native_lanes + 3, times.size());
-    simulate_batch(all, members.count, members.start(), times, members.samples(), Executor(threads),
-                   go_on);
+    simulate_batch(all, members.start(), times, members.samples(), Executor(threads), go_on);
     if (first.empty()) first = members.everything();
     EXPECT_EQ(members.everything(), first) << threads << " threads";
   }
@@ -192,7 +195,7 @@ TEST(BatchSimulation, AMemberThatFailsEndsAlone) {
   ModelSpec spec = tree_spec({revolute, revolute, revolute}, chain_parents(3), draws);
   spec.gravity = {0, 0, 0};
   const auto model = make_model(spec);
-  Simulation shared(model, fixed_step(0.1));
+  Simulation shared(model, steps_of(0.1));
   Drive stiff;
   stiff.kind = DriveKind::pd;
   stiff.kp = 1e7;
@@ -205,8 +208,8 @@ TEST(BatchSimulation, AMemberThatFailsEndsAlone) {
   for (size_t i : at_rest)
     for (int k = 0; k < 3; ++k) members.q[3 * i + k] = members.v[3 * i + k] = 0;
   std::fill(members.tau.begin(), members.tau.end(), 0);
-  const auto ends = simulate_batch(all, members.count, members.start(), times, members.samples(),
-                                   Executor(2), go_on);
+  const auto ends =
+      simulate_batch(all, members.start(), times, members.samples(), Executor(2), go_on);
   for (size_t i = 0; i < members.count; ++i) {
     const bool rests = i == at_rest[0] || i == at_rest[1];
     EXPECT_EQ(ends[i].outcome, rests ? Outcome::converged : Outcome::not_finite) << i;
@@ -230,26 +233,43 @@ TEST(BatchSimulation, AMachineThatCannotMove) {
     spec.joints.push_back(random_joint(revolute, "hinge" + std::to_string(i), spec.links[i].name,
                                        spec.links[i + 1].name, draws));
   const auto model = make_model(spec);
-  Simulation shared(model, fixed_step(1e-2));
+  Simulation shared(model, steps_of(1e-2));
   const Simulation* const all[] = {&shared};
   const std::vector<double> times = {0, 0.1};
   Members members(*model, native_lanes + 1, times.size());
-  for (const Ending& end : simulate_batch(all, members.count, members.start(), times,
-                                          members.samples(), Executor(1), go_on)) {
+  for (const Ending& end :
+       simulate_batch(all, members.start(), times, members.samples(), Executor(1), go_on)) {
     EXPECT_EQ(end.outcome, Outcome::not_positive_definite);
     EXPECT_EQ(end.time, 0);
   }
 }
 
+// Members that one simulation starts together are those of a batch, bit by bit.
+TEST(BatchSimulation, IsOneSimulationOfSeveralMembers) {
+  const auto model = make_model(every_kind());
+  Simulation shared(model, steps_of(1e-2));
+  const Simulation* const all[] = {&shared};
+  const std::vector<double> times = {0, 0.1};
+  Members batch(*model, native_lanes, times.size()), one(*model, native_lanes, times.size());
+  simulate_batch(all, batch.start(), times, batch.samples(), Executor(1), go_on);
+  Simulation together(model, steps_of(1e-2));
+  together.start(0, one.start());
+  Sample samples = one.samples();
+  samples.rows = times.size();
+  for (size_t k = 0; k < times.size(); ++k)
+    EXPECT_TRUE(together.advance(times[k], samples.at(*model, 0, k)));
+  EXPECT_EQ(one.everything(), batch.everything());
+}
+
 TEST(BatchSimulation, StopsWhenItIsAskedTo) {
   const auto model = make_model(pendulum());
-  Simulation shared(model, fixed_step(1e-3));
+  Simulation shared(model, steps_of(1e-3));
   const Simulation* const all[] = {&shared};
   const std::vector<double> times = {0, 0.01, 1e9};
   for (int threads : {1, 3}) {
     Members members(*model, 3 * native_lanes, times.size());
     std::atomic<int> asked{0};
-    const auto ends = simulate_batch(all, members.count, members.start(), times, members.samples(),
+    const auto ends = simulate_batch(all, members.start(), times, members.samples(),
                                      Executor(threads), [&] { return ++asked < 100; });
     for (const Ending& end : ends) EXPECT_EQ(end.outcome, Outcome::interrupted);
     EXPECT_TRUE(std::isfinite(members.row(members.position, 3 * native_lanes - 1, 0)[0]));
@@ -260,19 +280,29 @@ TEST(BatchSimulation, StopsWhenItIsAskedTo) {
 TEST(BatchSimulation, RefusesWhatItCannotTake) {
   const auto model = make_model(pendulum());
   for (std::string_view kind : all_kinds()) {
-    Simulation simulation(model, fixed_step(1e-3, kind));
+    Simulation simulation(model, steps_of(1e-3, kind));
     if (simulation.setup().options.integration.step > 0)
       EXPECT_NO_THROW(check_members(simulation.setup()));
     else
       EXPECT_THROW(check_members(simulation.setup()), InputError);
   }
-  Simulation driven(model, fixed_step(1e-3));
+  // The method and the state, at the one door as well.
+  const auto tree = make_model(every_kind());
+  const Members two(*tree, 2, 1);
+  for (const Formulation& f : {Formulation{"auto", StateChoice::joint_rates},
+                               Formulation{"constraint_force", StateChoice::joint_rates},
+                               Formulation{"constraint_force", StateChoice::body_velocities}}) {
+    Simulation other(tree, with(fixed_step(1e-3), f));
+    EXPECT_NO_THROW(other.start(0, {two.q.data(), two.v.data()}));
+    EXPECT_THROW(other.start(0, two.start()), InputError);
+  }
+  Simulation driven(model, steps_of(1e-3));
   Drive function;
   function.kind = DriveKind::torque_callable;
   function.callable = [](double, const double*, const double*, double* out) { *out = 0; };
   driven.set_drive(0, function);
   EXPECT_THROW(check_members(driven.setup()), InputError);
-  Simulation pushed(model, fixed_step(1e-3));
+  Simulation pushed(model, steps_of(1e-3));
   Wrench wrench;
   wrench.callable = [](double, double* out) { std::fill_n(out, 6, 0.0); };
   pushed.add_wrench(wrench);

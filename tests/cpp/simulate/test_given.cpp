@@ -43,7 +43,7 @@ TEST(Locked, EqualsTheMachineWithoutTheJoint) {
       Drive lock;
       lock.kind = DriveKind::locked;
       simulation.set_drive(1, lock);
-      simulation.start(0, state.q.data(), state.v.data());
+      simulation.start(0, {state.q.data(), state.v.data()});
 
       const auto welded = make_model(welded_at(spec, *model, state.q));
       const auto without = [](std::vector<double> x, int from, int count) {
@@ -53,7 +53,7 @@ TEST(Locked, EqualsTheMachineWithoutTheJoint) {
       Simulation reference(welded, options);
       const auto q0 = without(state.q, locked.q, locked.nq);
       const auto v0 = without(state.v, locked.v, locked.nv);
-      reference.start(0, q0.data(), v0.data());
+      reference.start(0, {q0.data(), v0.data()});
 
       const auto got = run(simulation, every(0.1, 0.5)), want = run(reference, every(0.1, 0.5));
       ASSERT_EQ(got.size(), 6u);
@@ -108,7 +108,7 @@ TEST(GivenMotion, IsFollowedExactly) {
       SCOPED_TRACE(std::string(joint_type_name(type)) + " " + ::testing::PrintToString(f));
       Simulation simulation(model, with(fixed_step(1e-3), f));
       simulation.set_drive(1, motion);
-      simulation.start(0, state.q.data(), state.v.data());
+      simulation.start(0, {state.q.data(), state.v.data()});
       for (double t : {0.0, 0.1, 0.2537}) {
         Recorded at;
         ASSERT_TRUE(advance(simulation, t, at));
@@ -141,7 +141,7 @@ TEST(GivenMotion, IsRefusedWhereItCannotBe) {
                     with(fixed_step(1e-3), {"constraint_force", StateChoice::body_velocities}));
   bodies.set_drive(0, motion);
   const std::vector<double> q = model->neutral_configuration(), v(model->nv());
-  EXPECT_THROW(bodies.start(0, q.data(), v.data()), InputError);
+  EXPECT_THROW(bodies.start(0, {q.data(), v.data()}), InputError);
 }
 
 /// A ball of 2 kg spinning about z at 3 rad/s, pushed with 4 N along x.
@@ -156,7 +156,7 @@ std::vector<Recorded> push(bool world) {
   wrench.value = {4, 0, 0, 0, 0, 0};
   simulation.add_wrench(wrench);
   const std::vector<double> q{0, 0, 0, 0, 0, 0, 1}, v{0, 0, 0, 0, 0, 3};
-  simulation.start(0, q.data(), v.data());
+  simulation.start(0, {q.data(), v.data()});
   return run(simulation, {0.7});
 }
 
@@ -188,7 +188,7 @@ TEST(Wrenches, AppearInTheJointLoads) {
   in_world.value = random_values(6, draws);
   simulation.add_wrench(in_body);
   simulation.add_wrench(in_world);
-  simulation.start(0, state.q.data(), state.v.data());
+  simulation.start(0, {state.q.data(), state.v.data()});
   const auto at = run(simulation, {0, 0.1});
   ASSERT_EQ(at.size(), 2u);
   const WorldTwin twin(*model);

@@ -63,7 +63,7 @@ TEST(Lifecycle, Simulations) {
     for (const IntegratorEntry& entry : integrator_registry()) {
       Simulation simulation(model, fixed_step(1e-3, entry.name));
       if (i % 2) simulation.set_drive(0, lock);
-      simulation.start(0, state.q.data(), at_rest.data());
+      simulation.start(0, {state.q.data(), at_rest.data()});
       ASSERT_EQ(run(simulation, {0.0015}).size(), 1u);
     }
 }
@@ -82,10 +82,11 @@ TEST(Lifecycle, BatchesOfSimulations) {
   Sample sample;
   sample["joint_load"] = loads.data();
   for (int i = 0; i < cycles; ++i) {
-    const Simulation simulation(model, fixed_step(1e-3));
+    const Simulation simulation(
+        model, with(fixed_step(1e-3), {"articulated_body", StateChoice::joint_rates}));
     const Simulation* const all[] = {&simulation};
-    const auto ends = simulate_batch(all, 3, {q.data(), v.data()}, times, sample, Executor(2),
-                                     [] { return true; });
+    const auto ends = simulate_batch(all, {q.data(), v.data(), nullptr, 3}, times, sample,
+                                     Executor(2), [] { return true; });
     ASSERT_EQ(ends[2].outcome, Outcome::converged);
   }
 }

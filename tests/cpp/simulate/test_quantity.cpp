@@ -28,7 +28,7 @@ TEST(Quantities, AreAsWideAsTheySay) {
   const auto model = make_model(every_kind());
   Simulation simulation(model, fixed_step(1e-2));
   const std::vector<double> q = model->neutral_configuration(), v(model->nv(), 0.1);
-  simulation.start(0, q.data(), v.data());
+  simulation.start(0, {q.data(), v.data()});
   for (size_t k = 0; k < quantity_table().size(); ++k) {
     const QuantityEntry& entry = quantity_table()[k];
     const size_t width = quantity_width(entry, *model);

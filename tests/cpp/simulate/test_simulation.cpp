@@ -29,7 +29,7 @@ TEST(Pendulum, SwingsWithItsPeriodInEveryIntegrator) {
     options.integration.tolerance = 1e-9;
     Simulation simulation(make_model(pendulum()), options);
     const double zero = 0;
-    simulation.start(0, &amplitude, &zero);
+    simulation.start(0, {&amplitude, &zero});
     const auto at = run(simulation, {0, period / 2, period});
     ASSERT_EQ(at.size(), 3u) << entry.name;
     const double tolerance = first_order ? 1e-4 : 1e-7;
@@ -47,7 +47,7 @@ TEST(Order, RungeKuttaIsOfFourthOrderOnEveryKindOfJoint) {
   const MachineState state = random_state(*model, draws);
   const auto end_of = [&](double step, const Formulation& f) {
     Simulation simulation(model, with(fixed_step(step), f));
-    simulation.start(0, state.q.data(), state.v.data());
+    simulation.start(0, {state.q.data(), state.v.data()});
     return run(simulation, {0.5}).at(0).q;
   };
   const std::vector<double> exact =
@@ -72,7 +72,7 @@ TEST(Conservation, EnergyOfAnUndrivenMachine) {
   for (const Formulation& f : formulations(*model)) {
     SCOPED_TRACE(::testing::PrintToString(f));
     Simulation simulation(model, with(fixed_step(2.5e-4), f));
-    simulation.start(0, state.q.data(), state.v.data());
+    simulation.start(0, {state.q.data(), state.v.data()});
     const auto at = run(simulation, every(0.25, 1));
     ASSERT_EQ(at.size(), 5u);
     for (const Recorded& i : at) EXPECT_NEAR(i.energy(), at[0].energy(), 1e-7 * at[0].kinetic);
@@ -89,7 +89,7 @@ TEST(Conservation, AnElasticStopGivesBackTheSpeed) {
   spec.joints[0].dof = {{DofProperty::upper, {1}}, {DofProperty::limit_stiffness, {400}}};
   Simulation simulation(make_model(spec), fixed_step(1e-4));
   const double q = 0, v = 2;
-  simulation.start(0, &q, &v);
+  simulation.start(0, {&q, &v});
   const double contact = std::numbers::pi / std::sqrt(400.0);
   const auto at = run(simulation, {0.5 + contact / 2, 1 + contact});
   ASSERT_EQ(at.size(), 2u);
@@ -114,7 +114,7 @@ TEST(Conservation, MomentumOfAFreeMachineUnderInnerForces) {
     SCOPED_TRACE(::testing::PrintToString(f));
     Simulation simulation(model, with(fixed_step(2.5e-4), f));
     simulation.set_drive(model->joint_index("joint1"), torque);
-    simulation.start(0, state.q.data(), state.v.data());
+    simulation.start(0, {state.q.data(), state.v.data()});
     const auto at = run(simulation, {0, 1});
     ASSERT_EQ(at.size(), 2u);
     std::vector<double> before(6), after(6);
@@ -136,7 +136,7 @@ TEST(Output, ChangesNothing) {
     options.dynamics.initial_guess = "cubic";
     const auto end_of = [&](const std::vector<double>& times, bool everything) {
       Simulation simulation(model, options);
-      simulation.start(0, state.q.data(), state.v.data());
+      simulation.start(0, {state.q.data(), state.v.data()});
       if (everything) return run(simulation, times).back().q;
       std::vector<double> q(model->nq());
       Sample only_q;
@@ -156,7 +156,7 @@ TEST(Output, QuaternionsAreOfUnitLengthWhateverTheStart) {
   const MachineState state = random_state(*model, draws);
   for (std::string_view kind : all_kinds()) {
     Simulation simulation(model, fixed_step(1e-3, kind));
-    simulation.start(0, state.q.data(), state.v.data());
+    simulation.start(0, {state.q.data(), state.v.data()});
     for (const Recorded& at : run(simulation, {0, 0.05, 0.1234})) {
       const double* p = &at.q[model->joints[1].q];
       EXPECT_NEAR(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3], 1, 1e-14);
@@ -169,10 +169,10 @@ TEST(Output, RestartsAfresh) {
   const auto model = make_model(every_kind());
   const MachineState state = random_state(*model, draws);
   Simulation simulation(model, fixed_step(1e-3));
-  simulation.start(0, state.q.data(), state.v.data());
+  simulation.start(0, {state.q.data(), state.v.data()});
   const auto first = run(simulation, {0, 0.1});
   const long steps = simulation.statistics().steps;
-  simulation.start(0, state.q.data(), state.v.data());
+  simulation.start(0, {state.q.data(), state.v.data()});
   const auto second = run(simulation, {0, 0.1});
   EXPECT_EQ(first[1].q, second[1].q);
   EXPECT_EQ(first[1].loads, second[1].loads);

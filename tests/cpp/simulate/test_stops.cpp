@@ -20,7 +20,7 @@ TEST(Stops, NotFiniteNamesTheJointAndKeepsWhatCameBefore) {
   const auto model = make_model(tree_spec(std::vector(n, revolute), chain_parents(n), draws));
   const auto check = [&](Simulation& simulation, int joint) {
     const std::vector<double> zero(n);
-    simulation.start(0, zero.data(), zero.data());
+    simulation.start(0, {zero.data(), zero.data()});
     EXPECT_EQ(run(simulation, every(0.1, 1)).size(), 3u);  // 0, 0.1, 0.2
     const Ending& stop = simulation.ending();
     EXPECT_FALSE(stop.ok());
@@ -65,7 +65,7 @@ TEST(Stops, AStateThatBlowsUpIsNotFinite) {
   };
   simulation.set_drive(0, drive);
   const double q = 0, v = 1;
-  simulation.start(0, &q, &v);
+  simulation.start(0, {&q, &v});
   const auto at = run(simulation, every(0.01, 10));
   EXPECT_LT(at.size(), 1000u);
   EXPECT_EQ(simulation.ending().outcome, Outcome::not_finite);
@@ -80,7 +80,7 @@ TEST(Stops, WhenItIsAskedTo) {
     int asked = 0;
     simulation.set_interrupt([&] { return ++asked > 20; });
     const double q = 0.5, v = 0;
-    simulation.start(0, &q, &v);
+    simulation.start(0, {&q, &v});
     EXPECT_EQ(run(simulation, {0, 1e-3, 1e9}).size(), 2u);
     EXPECT_EQ(simulation.ending().outcome, Outcome::interrupted);
     EXPECT_GT(simulation.ending().time, 1e-3);
@@ -106,7 +106,7 @@ TEST(Stops, AfterARecoveryWithoutAJoint) {
     int asked = 0;
     simulation.set_interrupt([&] { return failed && ++asked > 5; });
     const double q = 0.5, v = 0;
-    simulation.start(0, &q, &v);
+    simulation.start(0, {&q, &v});
     run(simulation, {0, 1e9});
     EXPECT_TRUE(failed);
     EXPECT_EQ(simulation.ending().outcome, Outcome::interrupted) << entry.name;
@@ -120,7 +120,7 @@ TEST(Stops, AStartThatIsNotFinite) {
   for (std::string_view kind : all_kinds()) {
     Simulation simulation(model, fixed_step(1e-3, kind));
     const double q = std::numeric_limits<double>::quiet_NaN(), v = 0;
-    simulation.start(0, &q, &v);
+    simulation.start(0, {&q, &v});
     Recorded at;
     EXPECT_FALSE(advance(simulation, 1, at));
     EXPECT_EQ(simulation.ending().outcome, Outcome::not_finite);
@@ -132,7 +132,7 @@ TEST(Stops, ABodyThatNothingResistsIsNamed) {
   spec.links[1].com = {};
   Simulation simulation(make_model(spec), fixed_step(1e-3));
   const double zero = 0;
-  simulation.start(0, &zero, &zero);
+  simulation.start(0, {&zero, &zero});
   EXPECT_EQ(run(simulation, {0, 1}).size(), 0u);
   EXPECT_EQ(simulation.ending().outcome, Outcome::not_positive_definite);
   EXPECT_EQ(simulation.ending().joint, 0);
@@ -165,17 +165,21 @@ TEST(Refused, EachWithOneLine) {
             "next body outboard");
   std::vector<double> q = model->neutral_configuration(), v(5);
   q.back() = 0;
-  EXPECT_EQ(error_of([&] { simulation.start(0, q.data(), v.data()); }),
+  EXPECT_EQ(error_of([&] {
+              simulation.start(0, {q.data(), v.data()});
+            }),
             "joint 'joint2' of arm.urdf: its quaternion has zero length; give x, y, z, w of length "
             "1");
   q.back() = 1;
   lock.kind = DriveKind::locked;
   simulation.set_drive(1, lock);
   v[1] = 0.1;
-  EXPECT_EQ(error_of([&] { simulation.start(0, q.data(), v.data()); }),
+  EXPECT_EQ(error_of([&] {
+              simulation.start(0, {q.data(), v.data()});
+            }),
             "joint 'joint1' of arm.urdf is locked but starts with a rate; start it at rest");
   v[1] = 0;
-  EXPECT_EQ(error_of([&] { simulation.start(0, q.data(), v.data()); }), "no error");
+  EXPECT_EQ(error_of([&] { simulation.start(0, {q.data(), v.data()}); }), "no error");
   EXPECT_NE(error_of([&] { Simulation(model, fixed_step(0)); }), "no error");
   SimulationOptions unknown = fixed_step(1e-3);
   unknown.dynamics.method = "magic";
