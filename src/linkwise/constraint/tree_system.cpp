@@ -26,7 +26,7 @@ TreeSystem::TreeSystem(const Model& model, const Executor& executor)
     parent.push_back(body.parent);
     dim.push_back(constraint_rows(model, n));
     // One-axis joints have a constant B; the others are filled in at every assembly.
-    if (body.kind != BodyKind::general) {
+    if (body.joint_kind != JointKind::general) {
       const Motion<double> P = element_column<double>(model.elements[body.first_element], 0);
       calc_joint_constraint(&P, &body.v, 1, armature, joint_[n]);
     }
@@ -174,7 +174,7 @@ void TreeSystem::assemble_at(const SweepInput<double>& in, std::span<const Motio
     const Motion<double> v_parent = body.parent >= 0 ? v[body.parent] : Motion<double>{};
     BodyState<double>& state = state_[n];
     const Force<double> external = state.bias;  // all that a body at rest has
-    if (body.kind == BodyKind::general) {
+    if (body.joint_kind == JointKind::general) {
       calc_general_state(model, body, in, v_parent, state, general_[body.general]);
     } else {
       const Motion<double> P = element_column<double>(model.elements[body.first_element], 0);

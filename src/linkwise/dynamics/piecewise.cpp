@@ -243,7 +243,7 @@ bool Piecewise::suits(const Model& model) {
   if (model.n_bodies() < min_bodies || model.n_joints() != model.n_bodies()) return false;
   for (int n = 0; n < model.n_bodies(); ++n) {
     const BodyTopology& body = model.topology[n];
-    const bool kind = body.kind == BodyKind::hinge || body.kind == BodyKind::revolute;
+    const bool kind = body.joint_kind == JointKind::hinge || body.joint_kind == JointKind::revolute;
     if (!kind || body.parent != n - 1 || body.q != n) return false;
   }
   return model.singular_body() < 0;

@@ -12,7 +12,7 @@ namespace linkwise {
 inline int body_columns(const Model& model, int n, const std::vector<GeneralState<double>>& general,
                         Motion<double>* P, int* dof) {
   const BodyTopology& body = model.topology[n];
-  if (body.kind == BodyKind::general) {
+  if (body.joint_kind == JointKind::general) {
     const auto& g = general[body.general];
     for (int i = 0; i < g.n; ++i) {
       P[i] = g.P[i];

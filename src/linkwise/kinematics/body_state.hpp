@@ -46,18 +46,18 @@ struct GeneralJoint {
 };
 template <class F>
 LW_INLINE void dispatch_kind_range(const KindRange& range, F&& f) {
-  switch (range.kind) {
-    case BodyKind::hinge:
+  switch (range.joint_kind) {
+    case JointKind::hinge:
       return f(HingeJoint{}, range.begin, range.end);
-    case BodyKind::revolute:
+    case JointKind::revolute:
       return f(RevoluteJoint{}, range.begin, range.end);
-    case BodyKind::geared:
+    case JointKind::geared:
       return f(GearedJoint{}, range.begin, range.end);
-    case BodyKind::prismatic:
+    case JointKind::prismatic:
       return f(PrismaticJoint{}, range.begin, range.end);
-    case BodyKind::helical:
+    case JointKind::helical:
       return f(HelicalJoint{}, range.begin, range.end);
-    case BodyKind::general:
+    case JointKind::general:
       return f(GeneralJoint{}, range.begin, range.end);
   }
 }

@@ -27,7 +27,7 @@ Branches::Branches(const Model& model) {
   for (int n = 0; n < n_bodies; ++n) {
     const BodyTopology& body = model.topology[n];
     if (size[n] > limit) {
-      append_to_ranges(trunk, body.kind, n);
+      append_to_ranges(trunk, body, n);
       continue;
     }
     const int inboard = body.parent >= 0 ? share_of[body.parent] : -1;
@@ -42,7 +42,7 @@ Branches::Branches(const Model& model) {
       share_of[n] = static_cast<int>(shares.size()) - 1;
       shares.back().roots.push_back(n);
     }
-    append_to_ranges(shares[share_of[n]].kind_ranges, body.kind, n);
+    append_to_ranges(shares[share_of[n]].kind_ranges, body, n);
   }
 }
 

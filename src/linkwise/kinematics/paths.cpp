@@ -11,14 +11,13 @@ Paths::Paths(const Model& model) {
   std::vector<Zone> zone(n_bodies);
   for (int n = 0; n < n_bodies; ++n) {
     const BodyTopology& at = model.topology[n];
-    const bool turns = at.kind == BodyKind::hinge || at.kind == BodyKind::revolute;
+    const bool turns = at.joint_kind == JointKind::hinge || at.joint_kind == JointKind::revolute;
     const Zone inboard = at.parent < 0 ? Zone::inboard : zone[at.parent];
     zone[n] = inboard == Zone::outboard  ? Zone::outboard
               : turns                    ? Zone::paths
               : inboard == Zone::inboard ? Zone::inboard
                                          : Zone::outboard;
-    if (zone[n] != Zone::paths)
-      append_to_ranges(zone[n] == Zone::inboard ? trunk : outer, at.kind, n);
+    if (zone[n] != Zone::paths) append_to_ranges(zone[n] == Zone::inboard ? trunk : outer, at, n);
   }
   // If several outboard bodies are equally high, the first one continues the path.
   std::vector<int> height(n_bodies, 0), outboard(n_bodies, -1);

@@ -58,13 +58,13 @@ void choose_hinge_frames(Bodies& bodies, PlacedJoints& placed) {
   std::vector<char> has_frame(n_bodies, 0);
   for (int n = 0; n < n_bodies; ++n) {
     const int p = bodies.topology[n].parent;
-    if (p < 0 || has_frame[p] || bodies.topology[n].kind != BodyKind::revolute ||
-        bodies.topology[p].kind == BodyKind::general)
+    if (p < 0 || has_frame[p] || bodies.topology[n].joint_kind != JointKind::revolute ||
+        bodies.topology[p].joint_kind == JointKind::general)
       continue;
     if (const auto X = common_normal_frame(bodies.constants[n].tree)) {
       frame[p] = *X;
       has_frame[p] = 1;
-      bodies.topology[n].kind = BodyKind::hinge;
+      bodies.topology[n].joint_kind = JointKind::hinge;
     }
   }
   for (int n = 0; n < n_bodies; ++n) {
@@ -80,8 +80,8 @@ void choose_hinge_frames(Bodies& bodies, PlacedJoints& placed) {
       k.tree = frame[n] * k.tree;
       k.inertia = transform_to_parent(inverse(frame[n]), k.inertia);
     }
-    if (body.kind == BodyKind::hinge) set_hinge(k);
-    if (body.kind != BodyKind::general) first.placement = k.tree;
+    if (body.joint_kind == JointKind::hinge) set_hinge(k);
+    if (body.joint_kind != JointKind::general) first.placement = k.tree;
   }
   for (JointInfo& joint : placed.joints)
     if (has_frame[joint.body]) joint.to_user = joint.to_user * inverse(frame[joint.body]);

@@ -35,10 +35,10 @@ void classify(const PlacedJoints& placed, BodyTopology& body, BodyConstants<doub
   if (e.prescribed || e.nv != 1) return;
   constants.pitch = e.pitch;
   constants.armature = placed.dof[static_cast<int>(DofProperty::armature)][e.v];
-  body.kind = e.kind == ElementKind::prismatic ? BodyKind::prismatic
-              : e.kind == ElementKind::helical ? BodyKind::helical
-              : constants.armature > 0         ? BodyKind::geared
-                                               : BodyKind::revolute;
+  body.joint_kind = e.kind == ElementKind::prismatic ? JointKind::prismatic
+                    : e.kind == ElementKind::helical ? JointKind::helical
+                    : constants.armature > 0         ? JointKind::geared
+                                                     : JointKind::revolute;
 }
 
 }  // namespace
@@ -69,7 +69,7 @@ Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const Bo
     constants.inertia = transform_to_parent(placed.joints[stack.back()].to_user, inertia);
     constants.tree = placed.elements[body.first_element + body.n_elements - 1].placement;
     classify(placed, body, constants);
-    if (body.kind == BodyKind::general) body.general = out.n_general++;
+    if (body.joint_kind == JointKind::general) body.general = out.n_general++;
     if (out.singular < 0 && is_singular(inertia)) out.singular = b;
     if (body.parent >= 0) ++out.topology[body.parent].n_children;
   }

@@ -12,7 +12,7 @@ namespace {
 std::vector<KindRange> ranges_of(const std::vector<BodyTopology>& bodies) {
   std::vector<KindRange> ranges;
   for (size_t b = 0; b < bodies.size(); ++b)
-    append_to_ranges(ranges, bodies[b].kind, static_cast<int>(b));
+    append_to_ranges(ranges, bodies[b], static_cast<int>(b));
   return ranges;
 }
 

@@ -20,14 +20,14 @@
 
 namespace linkwise {
 
-/// How a body is joined, as the sweeps dispatch it: one z element, or anything else. A hinge is a
-/// revolute joint without armature whose parent's frame was chosen so that the placement is that of
-/// Denavit and Hartenberg; geared is revolute with armature.
-enum class BodyKind : std::uint8_t { hinge, revolute, geared, prismatic, helical, general };
+/// What is between a body and its parent, as the sweeps dispatch it: one z element, or anything
+/// else. A hinge is a revolute joint without armature whose parent's frame was chosen so that the
+/// placement is that of Denavit and Hartenberg; geared is revolute with armature.
+enum class JointKind : std::uint8_t { hinge, revolute, geared, prismatic, helical, general };
 
 struct BodyTopology {
   int parent = -1;  ///< body index, -1: ground
-  BodyKind kind = BodyKind::general;
+  JointKind joint_kind = JointKind::general;
   int first_element = 0, n_elements = 0;
   int q = 0, nq = 0, v = 0, nv = 0;
   int n_children = 0;
@@ -45,18 +45,18 @@ struct BodyConstants {
   C cos_alpha{}, sin_alpha{}, a{}, d{}, theta{};
 };
 
-/// Bodies [begin, end) of one kind.
+/// Bodies [begin, end) on joints of one kind.
 struct KindRange {
-  BodyKind kind;
+  JointKind joint_kind;
   int begin, end;
 };
 
 /// Body n, the next one of its kind or the first of a new range.
-inline void append_to_ranges(std::vector<KindRange>& ranges, BodyKind kind, int n) {
-  if (!ranges.empty() && ranges.back().end == n && ranges.back().kind == kind)
+inline void append_to_ranges(std::vector<KindRange>& ranges, const BodyTopology& body, int n) {
+  if (!ranges.empty() && ranges.back().end == n && ranges.back().joint_kind == body.joint_kind)
     ++ranges.back().end;
   else
-    ranges.push_back({kind, n, n + 1});
+    ranges.push_back({body.joint_kind, n, n + 1});
 }
 
 struct JointInfo {

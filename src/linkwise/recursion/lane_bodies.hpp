@@ -136,7 +136,7 @@ class LaneBodies {
     bool skew = false;
     for (int l = 0; l < lanes; ++l) {
       const int n = body_at(k, l);
-      skew |= in_model(n) && model.topology[n].kind != BodyKind::hinge;
+      skew |= in_model(n) && model.topology[n].joint_kind != JointKind::hinge;
     }
     if (!skew) return;
     body_[k].skew = static_cast<int>(skew_.size());

@@ -74,13 +74,13 @@ struct TreeSweeps {
     for (int n = 0; n < model.n_bodies(); ++n) {
       const BodyTopology& at = model.topology[n];
       if (at.parent >= 0) receiver[n] = {&body[at.parent].sum, at.first_to_give};
-      if (at.kind != BodyKind::general || !is_free(model, at)) continue;
+      if (at.joint_kind != JointKind::general || !is_free(model, at)) continue;
       const auto rotors = armature.begin() + at.v;
       stack[at.general].is_free = std::count(rotors, rotors + 6, 0.0) == 6;
     }
     bool hinges_only = true;
     for (const KindRange& range : model.kind_ranges)
-      hinges_only &= range.kind == BodyKind::hinge || range.end == 1;
+      hinges_only &= range.joint_kind == JointKind::hinge || range.end == 1;
     pose.resize(hinges_only ? 1 : model.n_bodies());
   }
   // Receivers point into it.
@@ -137,7 +137,7 @@ struct TreeSweeps {
       body[n].velocity = {};
       body[n].sum.p = {};
       const BodyTopology& at = model.topology[n];
-      if (at.kind != BodyKind::general) continue;
+      if (at.joint_kind != JointKind::general) continue;
       BodyState<S> state;
       if (in.prescribed && !stack[at.general].is_free)
         calc_general_state(model, at, in, body[n].velocity, state, general[at.general]);

@@ -62,7 +62,7 @@ StackedSystem stacked_system(const Model& model, const SweepInput<double>& in) {
     if (body.parent < 0) given += states[i].X * ground;
 
     Motion<double> column = element_column<double>(model.elements[body.first_element], 0);
-    const bool is_general = body.kind == BodyKind::general;
+    const bool is_general = body.joint_kind == JointKind::general;
     const Motion<double>* P = is_general ? general[body.general].P : &column;
     const int* dof = is_general ? general[body.general].dof : &body.v;
     JointConstraint<double> joint;

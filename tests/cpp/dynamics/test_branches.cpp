@@ -82,7 +82,7 @@ TEST_P(BranchThreads, EveryBodyIsInOneShareOrTheTrunk) {
     for (const linkwise::KindRange& range : ranges)
       for (int n = range.begin; n < range.end; ++n) {
         EXPECT_EQ(where[n], -1);
-        EXPECT_EQ(model.topology[n].kind, range.kind);
+        EXPECT_EQ(model.topology[n].joint_kind, range.joint_kind);
         where[n] = place;
       }
   };

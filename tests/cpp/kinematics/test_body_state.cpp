@@ -60,7 +60,7 @@ TEST_P(BodyStates, VelocitiesAndAccelerationsAreRatesOfThePoses) {
     const auto accelerate = [&](const Motion<double>& P, double rate) {
       a[n] += Motion<double>{rate * P.lin, rate * P.ang};
     };
-    if (body.kind == BodyKind::general) {
+    if (body.joint_kind == JointKind::general) {
       const auto& g = swept.general[body.general];
       for (int i = 0; i < g.n; ++i) accelerate(g.P[i], du[g.dof[i]]);
     } else {

@@ -67,7 +67,7 @@ TEST(LightLinks, MasslessLinksBetweenBodiesStackTheirJoints) {
   ASSERT_EQ(model.n_bodies(), 2);
   ASSERT_EQ(model.n_joints(), 4);
   EXPECT_EQ(model.topology[0].n_elements, 4);
-  EXPECT_EQ(model.topology[0].kind, BodyKind::general);
+  EXPECT_EQ(model.topology[0].joint_kind, JointKind::general);
   EXPECT_EQ(model.body_name(0), "link2");
   EXPECT_EQ(notes_of(model),
             (Names{"merge link0: has no mass: joint 'joint0' is stacked with 'joint1'",
