@@ -112,16 +112,17 @@ int joint_of(const PyModel& self, nb::handle body) {
 
 void bind_poses(nb::module_& m) {
   m.def(
-      "body_poses",
+      "joint_poses",
       [](const PyModel& self, nb::handle q, nb::handle threads) {
         return map_states(self, q, nb::none(), threads, {size(self.model->n_joints()), 4, 4},
                           [](const Model& m, const double* q, const double*, double* out) {
-                            body_poses(m, q, out);
+                            joint_poses(m, q, out);
                           });
       },
       "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Poses (..., n_joints, 4, 4) of the bodies' frames (their joints' outboard frames) in the "
-      "world.");
+      "Poses (..., n_joints, 4, 4) of the joint frames, each fixed in its joint's child link: 4 x "
+      "4 "
+      "matrices that take points of that frame to the world, m.");
   m.def(
       "link_poses",
       [](const PyModel& self, nb::handle q, nb::handle threads) {

@@ -122,9 +122,9 @@ void bind_sizes(ModelClass& c) {
           "Joints that carry a load; loads are (..., n_joints, 6).")
       .def_prop_ro(
           "n_bodies", [](const PyModel& s) { return s.model->n_bodies(); },
-          "Bodies of the recursion: n_joints without those that are stacked because the link "
-          "between "
-          "them has no mass.")
+          "Bodies of the recursion: parts with mass. Fewer than n_joints where links between "
+          "joints "
+          "have no mass.")
       .def_prop_ro(
           "total_mass", [](const PyModel& s) { return s.model->total_mass(); },
           "Mass of the moving bodies, kg.")
@@ -186,14 +186,14 @@ void bind_joints(ModelClass& c) {
           "its "
           "integral).")
       .def_prop_ro(
-          "body_names",
+          "child_link_names",
           [](const PyModel& s) {
             return list_per_joint(s,
                                   [&](const JointInfo& j) { return s.model->links[j.link].name; });
           },
-          "Child link of each joint.")
+          "Name of the link that each joint moves, its child, in the order of joint_names.")
       .def_prop_ro(
-          "body_masses",
+          "child_link_masses",
           [](const PyModel& s) {
             std::vector<double> masses;
             for (const auto& j : s.model->joints)

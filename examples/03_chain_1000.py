@@ -32,7 +32,7 @@ run = lw.simulate(
 )
 
 end = run.position.isel(time=-1).values
-tip = lw.body_poses(model, end)[-1] @ [0, 0, -1.0, 1]  # the far end of the last rod
+tip = lw.joint_poses(model, end)[-1] @ [0, 0, -1.0, 1]  # the far end of the last rod
 check("height of the tip after 1 s", tip[2], -G / 2, 1e-6, "m")
 energy = run.kinetic_energy + run.potential_energy
 drift = float(energy[-1] - lw.potential_energy(model, q0)) / float(run.kinetic_energy[-1])

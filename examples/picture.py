@@ -52,7 +52,7 @@ def draw_machine(axis, run, times, tips, view):
     names = model.joint_names
     for when, grey in zip(times, np.linspace(0.8, 0.0, len(times)), strict=True):
         q = run.position.sel(time=when, method="nearest").values
-        poses = np.asarray(lw.body_poses(model, q))
+        poses = np.asarray(lw.joint_poses(model, q))
         style = {"color": str(grey), "linewidth": 1.2, "markersize": 2.5}
         if len(names) > 100:
             style |= {"markersize": 0}

@@ -1,5 +1,6 @@
 """Checks that the C++ sources include only what their layer may see (ARCHITECTURE.md, layers), that
-neither includes nor Python imports go in circles, and that ARCHITECTURE.md shows the true arrows.
+neither includes nor Python imports go in circles or hide, and that ARCHITECTURE.md shows the true
+arrows.
 
 Run from anywhere: python tools/check_layers.py [repository]. Prints one line per violation and
 exits with status 1 when there is any. With --arrows it writes the arrows into ARCHITECTURE.md.
@@ -12,7 +13,17 @@ import re
 import sys
 from pathlib import Path
 
-from import_graph import SUFFIXES, arrows, circles, import_graph, include_graph, includes, rooms
+from import_graph import (
+    PACKAGE,
+    SUFFIXES,
+    arrows,
+    circles,
+    import_graph,
+    include_graph,
+    includes,
+    late_imports,
+    rooms,
+)
 
 #: What each layer may include besides itself. Two columns, numerics and mechanics, meet in
 #: dynamics: solve never sees a mechanism, constraint fills the systems of linear without solving.
@@ -56,6 +67,26 @@ THIRD_PARTIES = {
 SYSTEM = re.compile(
     r"([a-z_]+intrin|unistd|sched|pthread|sys/(mman|resource|stat|types))\.h|[a-z0-9_]+"
 )
+
+#: Packages that a function may import when it is called: optional ones, and slow ones that not
+#: every command needs.
+LATE_PACKAGES = {
+    "h5netcdf",
+    "h5py",
+    "matplotlib",
+    "mujoco",
+    "plotly",
+    "rainflow",
+    "scipy",
+    "trimesh",
+    "viser",
+    "xarray",
+    "zarr",
+}
+#: May import anything late: the command line answers --help before it loads NumPy and the core.
+LATE_ROOM = "cli"
+#: May import by a string: the public names, and the core for this CPU.
+BY_NAME = {f"{PACKAGE}/__init__.py", f"{PACKAGE}/_core.py"}
 
 #: The arrows in ARCHITECTURE.md, a code block between two marks.
 ARROWS = re.compile(r"(<!-- arrows -->\n).*?(<!-- /arrows -->)", re.DOTALL)
@@ -112,6 +143,23 @@ def check_circles(root: Path) -> list[str]:
     ]
 
 
+def check_hidden_imports(root: Path) -> list[str]:
+    """Imports stand where a reader of the file's head finds them, with the exceptions above."""
+    violations = []
+    for file in sorted((root / PACKAGE).rglob("*.py")):
+        path, parts = file.relative_to(root).as_posix(), file.relative_to(root / PACKAGE).parts
+        room = f"linkwise.{parts[0]}"
+        for number, name in late_imports(file, ".".join(["linkwise", *parts[:-1]])):
+            if not name:
+                if path not in BY_NAME:
+                    violations.append(f"{path}:{number}: imports by a name; write the import")
+            elif name.partition(".")[0] not in LATE_PACKAGES | sys.stdlib_module_names and not (
+                parts[0] == LATE_ROOM or name.startswith(f"{room}.")
+            ):
+                violations.append(f"{path}:{number}: {name}: import it at the top of the file")
+    return violations
+
+
 def picture(root: Path) -> str:
     """Who sees whom, lowest first, without what is seen through another one."""
     core = {file: to for file, to in include_graph(root).items() if file.startswith("src/")}
@@ -147,7 +195,12 @@ def main() -> int:
         document.write_text(
             ARROWS.sub(lambda m: f"{m[1]}{picture(root)}{m[2]}", text), encoding="utf-8"
         )
-    violations = [*check(root), *check_circles(root), *check_picture(root)]
+    violations = [
+        *check(root),
+        *check_circles(root),
+        *check_hidden_imports(root),
+        *check_picture(root),
+    ]
     print(*violations, sep="\n", end="\n" if violations else "")
     print(f"check_layers: {len(violations)} violations")
     return 1 if violations else 0

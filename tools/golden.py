@@ -136,7 +136,7 @@ def machines() -> Iterator[tuple[str, Callable[[], lw.Model]]]:
 def states(model: lw.Model, count: int) -> dict[str, Any]:
     """Random q, v, tau (count, ...) and a wrench on every body that has mass."""
     rng = np.random.default_rng([count, model.nv])
-    heavy = np.asarray(model.body_masses)[:, None] > 0
+    heavy = np.asarray(model.child_link_masses)[:, None] > 0
     reach = 1.0 if model.nv < 1000 else 0.05
     return {
         "q": random_configuration(model, rng, (count,), reach),
@@ -211,7 +211,7 @@ def show_rest(name: str, model: lw.Model) -> None:
     show(name, "momentum", partial(lw.momentum, model, q, v))
     show(name, "passive torque", partial(lw.passive_torque, model, q, v))
     show(name, "link poses", partial(lw.link_poses, model, q))
-    show(name, "joint poses", partial(lw.body_poses, model, q))
+    show(name, "joint poses", partial(lw.joint_poses, model, q))
     show(name, "jacobian", partial(lw.body_jacobian, model, q, len(model.joint_names) - 1))
     if model.nv < SLOW_FROM:
         show(name, "system", partial(system, model, batch))
@@ -267,8 +267,9 @@ def runs() -> Iterator[tuple[str, Callable[[], lw.Run]]]:
         names[2]: lw.Motion(lambda t: (0.1 * t**2, 0.2 * t, 0.2)),
         names[4]: 5.0,
     }
-    wrenches = {srms().body_names[-1]: lw.Wrench(weight)}
-    along = {srms().body_names[2]: lw.Wrench(lambda t: np.cos(t) * np.array(weight), frame="body")}
+    wrenches = {srms().child_link_names[-1]: lw.Wrench(weight)}
+    turning = lw.Wrench(lambda t: np.cos(t) * np.array(weight), frame="body")
+    along = {srms().child_link_names[2]: turning}
     arm = loaded_arm.arm
     for integrator in ("adams", "bdf"):
         options = {"integrator": integrator, "duration": 0.4, "every": 0.02}

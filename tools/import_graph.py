@@ -11,6 +11,8 @@ Graph = dict[str, set[str]]
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 SUFFIXES = {".hpp", ".cpp", ".cu", ".h"}
 PACKAGE = "python/linkwise"
+#: What imports a module by a string, which no reader of imports sees.
+BY_NAME = {"import_module", "__import__"}
 
 
 def includes(path: Path) -> Iterator[tuple[int, str, str]]:
@@ -51,6 +53,21 @@ def import_graph(root: Path) -> Graph:
         nearest = {_nearest(name, files) for name in named}
         graph[module] = {name for name in nearest if name and name != module}
     return graph
+
+
+def late_imports(file: Path, package: str) -> Iterator[tuple[int, str]]:
+    """Line number and module of every import inside a function, and "" for an import by a name."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            for inner in ast.walk(node):
+                if isinstance(inner, ast.Import | ast.ImportFrom):
+                    yield inner.lineno, next(_imported(ast.Module([inner], []), package))
+        elif isinstance(node, ast.Attribute | ast.Name | ast.alias):
+            name = node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
+            name = node.name if isinstance(node, ast.alias) else name
+            if name in BY_NAME:
+                yield node.lineno, ""
 
 
 def _module(file: Path, top: Path) -> str:

@@ -57,7 +57,7 @@ RETURNS = {
     "ConstraintSystem.sparse": "Any",
     "Evaluator.evaluate": "tuple[Array, Array, Report]",
     "Evaluator.follow": "dict[str, Any]",
-    "Model.body_names": "list[str]",
+    "Model.child_link_names": "list[str]",
     "Model.joint_labels": "tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str], ...]]",
     "Model.joint_axes": "list[list[tuple[str, tuple[float, float, float]]]]",
     "Model.joint_names": "list[str]",

@@ -14,7 +14,6 @@ from linkwise._core import NumericsError as NumericsError
 from linkwise._core import Report as Report
 from linkwise._core import Spectrum as Spectrum
 from linkwise._core import body_jacobian as body_jacobian
-from linkwise._core import body_poses as body_poses
 from linkwise._core import forward_dynamics as forward_dynamics
 from linkwise._core import initial_guesses as initial_guesses
 from linkwise._core import integrators as integrators
@@ -22,6 +21,7 @@ from linkwise._core import inverse_dynamics as inverse_dynamics
 from linkwise._core import inverse_dynamics_loads as inverse_dynamics_loads
 from linkwise._core import joint_loads as joint_loads
 from linkwise._core import joint_loads_by_cause as joint_loads_by_cause
+from linkwise._core import joint_poses as joint_poses
 from linkwise._core import kinetic_energy as kinetic_energy
 from linkwise._core import link_poses as link_poses
 from linkwise._core import mass_matrix as mass_matrix
@@ -48,9 +48,9 @@ from linkwise.results import open_run as open_run
 from linkwise.scenario import load_scenario as load_scenario
 from linkwise.simulation.batch import simulate_batch as simulate_batch
 from linkwise.simulation.numerics import Numerics as Numerics
+from linkwise.simulation.scenarios import run_scenario as run_scenario
 from linkwise.simulation.simulate import SimulationError as SimulationError
 from linkwise.simulation.simulate import SimulationInterrupted as SimulationInterrupted
-from linkwise.simulation.simulate import run_scenario as run_scenario
 from linkwise.simulation.simulate import simulate as simulate
 from linkwise.simulation.sweep import sweep as sweep
 from linkwise.simulation.time_loop import Progress as Progress

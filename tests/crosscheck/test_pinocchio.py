@@ -147,7 +147,7 @@ def test_energies_and_momenta(robot):
 
 def test_poses_and_jacobians(robot):
     _, model, q, _, _, ref = robot
-    assert_close(lw.body_poses(model, q), ref["poses"], 1e-11, axis=(-3, -2, -1), what="poses")
-    last = model.body_names[-1]
+    assert_close(lw.joint_poses(model, q), ref["poses"], 1e-11, axis=(-3, -2, -1), what="poses")
+    last = model.child_link_names[-1]
     jacobian = lw.body_jacobian(model, q, last)
     assert_close(jacobian, ref["jacobian"], 1e-11, axis=(-2, -1), what=f"Jacobian of {last}")

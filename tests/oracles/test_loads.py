@@ -64,7 +64,7 @@ def test_a_falling_chain_is_weightless(n, method, rng):
     model = rod_chain(n, floating=True)
     q, zero = random_configuration(model, rng), np.zeros(model.nv)
     full = lw.forward_dynamics(model, q, zero, zero, method=method, full=True)
-    R = lw.body_poses(model, q)[0, :3, :3]
+    R = lw.joint_poses(model, q)[0, :3, :3]
     expected = np.r_[R.T @ (0, -G, 0), np.zeros(model.nv - 3)]
     np.testing.assert_allclose(full.acceleration, expected, atol=1e-9)
     np.testing.assert_allclose(full.joint_load, 0, atol=1e-9)

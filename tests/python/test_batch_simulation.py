@@ -53,7 +53,7 @@ def test_members_are_the_simulations_one_by_one(integrator, count, rng):
         "every": 0.1,
         "integrator": integrator,
         "drives": DRIVES,
-        "wrenches": {model.body_names[-1]: lw.Wrench([1.0, 2, 3, 4, 5, 6])},
+        "wrenches": {model.child_link_names[-1]: lw.Wrench([1.0, 2, 3, 4, 5, 6])},
     }
     batch = lw.simulate_batch(model, q0=q0, v0=v0, **options)
     assert batch.sizes["member"] == count
@@ -86,7 +86,7 @@ def test_every_joint_type_from_its_neutral_configuration(rng):
 def test_axes_of_the_members(rng):
     """Leading axes broadcast; several models come first; the order is NumPy's."""
     light = machine()
-    link = light.body_names[-1]
+    link = light.child_link_names[-1]
     models = [light.with_payload(link, mass=mass) for mass in (10.0, 500.0)]
     q0 = 0.3 * rng.standard_normal((3, 1, light.nq))
     tau = rng.standard_normal((4, light.nv))
@@ -176,7 +176,7 @@ def test_only_what_is_asked_for_is_recorded():
 def test_bad_input(changed, message):
     given = {"model": machine(), "step": 1e-2, "duration": 0.1} | changed
     if "wrenches" in given:
-        given["wrenches"] = {machine().body_names[-1]: given["wrenches"]["link_6"]}
+        given["wrenches"] = {machine().child_link_names[-1]: given["wrenches"]["link_6"]}
     with pytest.raises(lw.InputError, match=message):
         lw.simulate_batch(given.pop("model"), **given)
 

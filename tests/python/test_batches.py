@@ -24,7 +24,7 @@ FUNCTIONS = {
     "kinetic_energy": lambda m, q, v, tau, **o: lw.kinetic_energy(m, q, v, **o),
     "potential_energy": lambda m, q, v, tau, **o: lw.potential_energy(m, q, **o),
     "momentum": lambda m, q, v, tau, **o: lw.momentum(m, q, v, **o),
-    "body_poses": lambda m, q, v, tau, **o: lw.body_poses(m, q, **o),
+    "joint_poses": lambda m, q, v, tau, **o: lw.joint_poses(m, q, **o),
     "link_poses": lambda m, q, v, tau, **o: lw.link_poses(m, q, **o),
     "body_jacobian": lambda m, q, v, tau, **o: lw.body_jacobian(m, q, 0, **o),
     "passive_torque": lambda m, q, v, tau, **o: lw.passive_torque(m, q, v, **o),
@@ -99,9 +99,9 @@ def test_shapes_that_do_not_fit_are_named():
     with pytest.raises(ValueError, match=r"q has shape \(4,\) but shape \(..., 3\) is expected"):
         lw.forward_dynamics(model, np.zeros(4), np.zeros(3))
     with pytest.raises(ValueError, match=r"q has shape \(\) but shape"):
-        lw.body_poses(model, 1.0)
+        lw.joint_poses(model, 1.0)
     with pytest.raises(ValueError, match="an array has more than 16 axes"):
-        lw.body_poses(model, np.zeros((1,) * 20 + (3,)))
+        lw.joint_poses(model, np.zeros((1,) * 20 + (3,)))
 
 
 @pytest.mark.parametrize(

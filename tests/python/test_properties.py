@@ -29,7 +29,7 @@ def test_inverse_dynamics_and_joint_loads_are_newton_and_eulers(tree):
     assert_close(lw.inverse_dynamics(model, q, v, a), tau, 1e-11, floor=1.0, what="torque")
     expected = [loads[name] for name in model.joint_names]
     assert load_error(lw.joint_loads(model, q, v, tau), expected, floor=1.0) < 1e-9
-    poses = lw.body_poses(model, q)
+    poses = lw.joint_poses(model, q)
     np.testing.assert_allclose(
         poses[:, :3, :3], [motions[n].R for n in model.joint_names], atol=1e-12
     )
@@ -80,7 +80,7 @@ def test_jacobian_gives_the_body_velocity(tree, pick):
     pick %= len(model.joint_names)
     motion = newton_euler(tree, model, q, v, a)[2][model.joint_names[pick]]
     velocity = np.r_[motion.R.T @ motion.v, motion.R.T @ motion.w]
-    J = lw.body_jacobian(model, q, model.body_names[pick])
+    J = lw.body_jacobian(model, q, model.child_link_names[pick])
     assert_close(J @ v, velocity, 1e-11, floor=1.0)
 
 

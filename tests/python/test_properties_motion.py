@@ -64,7 +64,7 @@ def test_floating_trees_keep_their_momentum(tree):
     momentum = lw.momentum(model, q, v)
     # Scale: the momentum that the kinetic energy could hold, at the farthest body's distance.
     size = np.sqrt(2 * model.total_mass * lw.kinetic_energy(model, q, v).max())
-    reach = 1 + np.abs(lw.body_poses(model, q)[..., :3, 3]).max()
+    reach = 1 + np.abs(lw.joint_poses(model, q)[..., :3, 3]).max()
     drift = np.abs(momentum - momentum[0]).max(axis=0)
     assert drift[:3].max() < 10 * TOLERANCE * size
     assert drift[3:].max() < 10 * TOLERANCE * size * reach

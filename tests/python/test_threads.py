@@ -48,7 +48,7 @@ def inverse(threads, model, q, v, tau):
     return [
         lw.inverse_dynamics(model, q, v, tau, threads=threads),
         lw.inverse_dynamics_loads(model, q, v, tau, threads=threads),
-        lw.body_poses(model, q, threads=threads),
+        lw.joint_poses(model, q, threads=threads),
         lw.kinetic_energy(model, q, v, threads=threads),
     ]
 

@@ -166,6 +166,38 @@ def test_a_circle_of_imports_is_found(tmp_path, late):
     assert violation == "linkwise.one: imports go in a circle: linkwise.one, linkwise.two"
 
 
+@pytest.mark.parametrize(
+    ("path", "text", "problem"),
+    [
+        ("loads/a.py", 'import importlib\nx = importlib.import_module("b")\n', ":2: imports by"),
+        ("loads/a.py", "from importlib import import_module\n", ":1: imports by a name"),
+        ("loads/a.py", '__import__("linkwise.plot")\n', ":1: imports by a name"),
+        ("loads/a.py", "def f():\n    from linkwise import plot\n", ":2: linkwise.plot: import"),
+        ("loads/a.py", "def f():\n    from ..plot import b\n", ":2: linkwise.plot.b: import"),
+        ("loads/a.py", "def f():\n    import lxml.etree\n", ":2: lxml.etree: import it"),
+    ],
+)
+def test_a_hidden_import_is_found(tmp_path, path, text, problem):
+    write(tmp_path, f"python/linkwise/{path}", text)
+    (violation,) = layers.check_hidden_imports(tmp_path)
+    assert problem in violation
+
+
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        ("__init__.py", "from importlib import import_module\n"),
+        ("cli/a.py", "def f():\n    from linkwise.loads import b\n    import rich\n"),
+        ("loads/a.py", "def f():\n    from html import escape\n    import scipy.signal\n"),
+        ("loads/a.py", "def f():\n    from linkwise.loads.peaks import summary\n"),
+        ("loads/a.py", "from linkwise.plot import b\n"),
+    ],
+)
+def test_an_import_in_sight_is_not_reported(tmp_path, path, text):
+    write(tmp_path, f"python/linkwise/{path}", text)
+    assert layers.check_hidden_imports(tmp_path) == []
+
+
 def test_arrows_leave_out_what_is_seen_through_another():
     graph = {"top": {"middle", "base"}, "middle": {"base"}, "base": set(), "alone": {"base"}}
     assert import_graph.arrows(graph) == [
@@ -189,6 +221,7 @@ def test_a_stale_picture_of_the_layers_is_found(tmp_path):
 def test_this_repository_passes():
     assert layers.check(ROOT) == []
     assert layers.check_circles(ROOT) == []
+    assert layers.check_hidden_imports(ROOT) == []
     assert layers.check_picture(ROOT) == []
     try:
         paths = tracked_files(ROOT)

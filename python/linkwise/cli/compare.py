@@ -45,9 +45,12 @@ def compare(
     from linkwise.compare import compare as run_comparison
     from linkwise.compare import driven_trajectory, free_trajectory
     from linkwise.compare import plot as draw
+    from linkwise.io.writing import check_file, write_text
 
     if plot is not None and plot.suffix.lower() != ".svg":
         raise typer.BadParameter(f"{plot}: charts are written as SVG; name a file in .svg")
+    if plot is not None:
+        check_file(plot)
     loaded, scenario = load_given(model, floating_base, package_dir)
     if scenario is None:
         trajectory = free_trajectory(loaded, states, seed)
@@ -58,7 +61,7 @@ def compare(
             loaded, trajectory, tolerance=tolerance, stop=stop, time_limit=limit, progress=progress
         )
     if plot is not None:
-        plot.write_text(draw(found) + "\n", encoding="utf-8")
+        write_text(plot, draw(found) + "\n")
         found["plot"] = str(plot)
     if as_json:
         print_json(found)

@@ -42,8 +42,8 @@ def inspect(
 
 def describe_model(model: Model) -> dict[str, Any]:
     """The model as plain data: what the tables and `--json` show."""
-    names, types, bodies = model.joint_names, model.joint_types, model.body_names
-    parents, axes, masses = model.joint_parents, model.joint_axes, model.body_masses.tolist()
+    names, types, bodies = model.joint_names, model.joint_types, model.child_link_names
+    parents, axes, masses = model.joint_parents, model.joint_axes, model.child_link_masses.tolist()
     limits = {
         key: getattr(model, f"{key}_limit").tolist()
         for key in ("lower", "upper", "effort", "velocity")

@@ -60,9 +60,13 @@ def loads(
 ) -> None:
     """Peak loads of every joint of a RUN: with bounds, by cause, against ratings."""
     from linkwise.io.load import load
+    from linkwise.io.writing import check_file
+    from linkwise.loads.samples import joint_position
     from linkwise.results import open_run
-    from linkwise.results.samples import joint_position
 
+    for written in (csv, html):
+        if written is not None:
+            check_file(written)
     opened = open_run(run)
     for name in joint or ():
         joint_position(opened, name)
@@ -180,17 +184,15 @@ def write_csv(records: list[dict[str, Any]], path: Path) -> None:
     import csv
 
     from linkwise._core import InputError
+    from linkwise.io.writing import csv_cell, written_whole
 
     if not records:
         raise InputError(f"{str(path)!r}: there is nothing to write")
-    try:
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, records[0], lineterminator="\n")
-            writer.writeheader()
-            for record in records:
-                writer.writerow({k: "" if v != v else v for k, v in record.items()})
-    except OSError as error:
-        raise InputError(f"{str(path)!r}: cannot write it ({error.strerror})") from None
+    with written_whole(path) as aside, open(aside, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, records[0], lineterminator="\n")
+        writer.writeheader()
+        for record in records:
+            writer.writerow({k: "" if v != v else csv_cell(v) for k, v in record.items()})
 
 
 def peak_shares(run: Run, model: Model, summary: xr.Dataset, by: str) -> list[dict[str, Any]]:

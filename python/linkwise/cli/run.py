@@ -44,7 +44,8 @@ def run(
     from linkwise.cli.progress import live_progress
     from linkwise.record.claim import unused_path
     from linkwise.scenario import load_scenario
-    from linkwise.simulation.simulate import SimulationError, SimulationInterrupted, run_scenario
+    from linkwise.simulation.scenarios import run_scenario
+    from linkwise.simulation.simulate import SimulationError, SimulationInterrupted
 
     loaded = load_scenario(scenario)
     if output is None and loaded.settings.output.path is None:

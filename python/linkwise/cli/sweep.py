@@ -36,6 +36,7 @@ def sweep(
 ) -> None:
     """Simulate a SCENARIO with every combination of values, side by side."""
     from linkwise._core import InputError
+    from linkwise.io.writing import check_file
     from linkwise.record.export import write_netcdf
     from linkwise.scenario import parse_axis
     from linkwise.simulation.sweep import sweep as run_sweep
@@ -45,8 +46,8 @@ def sweep(
         if key in axes:
             raise InputError(f"--set {key}: is given twice; put all values into one list")
         axes[key] = values
-    if output is not None and not output.parent.is_dir():
-        raise InputError(f"{str(output)!r}: folder {str(output.parent)!r} does not exist")
+    if output is not None:
+        check_file(output)
     found = run_sweep(scenario, axes, processes=processes)
     if output is not None:
         write_netcdf(found, output)

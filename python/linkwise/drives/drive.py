@@ -14,6 +14,7 @@ import numpy.typing as npt
 from linkwise._core import InputError
 from linkwise.base import Array
 from linkwise.drives.jumps import LEAST_ROWS, NAMES, find_jump
+from linkwise.io.table import read_table
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -93,8 +94,6 @@ class Table:
 
         Raises InputError with file, line and column for gaps, NaN and time running backwards.
         """
-        from linkwise.io.table import read_table
-
         table = read_table(path)
         wanted = table.names if columns is None else columns
         names = [wanted] if isinstance(wanted, str) else list(wanted)

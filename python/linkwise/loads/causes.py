@@ -10,7 +10,7 @@ import numpy as np
 from linkwise import _core
 from linkwise._core import InputError
 from linkwise.base import Array
-from linkwise.results.samples import (
+from linkwise.loads.samples import (
     drive_kinds,
     external,
     given_motions,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 By = Literal["force", "motion"]
 
@@ -57,7 +57,7 @@ class Split:
     alone: by force, one factorisation serves all causes. By motion nothing is to be solved.
     """
 
-    def __init__(self, run: Run, by: By, model: Model | None) -> None:
+    def __init__(self, run: RunLike, by: By, model: Model | None) -> None:
         if by not in CAUSES:
             raise InputError(f'by: {by!r} is unknown; use "force" or "motion"')
         self.run, self.by = run, by
@@ -126,7 +126,7 @@ class Split:
         return shares
 
 
-def split(run: Run, by: By = "force", model: Model | None = None) -> xr.DataArray:
+def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.DataArray:
     """Joint loads by cause; the shares add up to the joint load to rounding.
 
     Args:

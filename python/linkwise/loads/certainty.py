@@ -21,7 +21,7 @@ from linkwise._core import InputError
 from linkwise.base import Array
 from linkwise.loads.engineering import derive, derived_rows, joint_directions
 from linkwise.loads.peaks import summary
-from linkwise.results.samples import (
+from linkwise.loads.samples import (
     blocks,
     external,
     given_motions,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 # How many times tighter `--certify` simulates again.
 TIGHTER = 100.0
@@ -46,7 +46,7 @@ SAFETY = 2.0
 _ROUNDING = 64 * np.finfo(np.float64).eps
 
 
-def refined_loads(run: Run, model: Model, where: slice) -> Array:
+def refined_loads(run: RunLike, model: Model, where: slice) -> Array:
     """Joint loads (time, joint, 6) after one step of refinement of the recorded accelerations."""
     q, v = rows(run, "position", where), rows(run, "velocity", where)
     a = rows(run, "acceleration", where)
@@ -62,7 +62,7 @@ def refined_loads(run: Run, model: Model, where: slice) -> Array:
     return np.asarray(loads + step.joint_load)
 
 
-def _algebraic(run: Run, model: Model, names: list[str]) -> Array:
+def _algebraic(run: RunLike, model: Model, names: list[str]) -> Array:
     """Largest algebraic error over time (quantity, joint)."""
     directions = joint_directions(model)
     worst = np.zeros((len(names), model.n_joints))
@@ -83,12 +83,12 @@ def _algebraic(run: Run, model: Model, names: list[str]) -> Array:
     return worst
 
 
-def _step_tolerance(run: Run) -> float:
+def _step_tolerance(run: RunLike) -> float:
     options = json.loads(run.dataset.attrs.get("options", "{}"))
     return float(options.get("step_tolerance", np.nan))
 
 
-def _check_tighter(run: Run, tighter: Run) -> None:
+def _check_tighter(run: RunLike, tighter: RunLike) -> None:
     same = np.array_equal(run.dataset["time"].values, tighter.dataset["time"].values)
     if not same or joint_names(run) != joint_names(tighter):
         raise InputError(
@@ -105,7 +105,9 @@ def _check_tighter(run: Run, tighter: Run) -> None:
         )
 
 
-def _integration(run: Run, tighter: Run, model: Model, names: list[str], until: Array) -> Array:
+def _integration(
+    run: RunLike, tighter: RunLike, model: Model, names: list[str], until: Array
+) -> Array:
     """Error bound (quantity, joint) of the peaks: the largest distance of the two runs until both
     have had theirs."""
     found = select(run, model)
@@ -126,7 +128,7 @@ def _integration(run: Run, tighter: Run, model: Model, names: list[str], until: 
     return SAFETY * bound
 
 
-def bounds(run: Run, tighter: Run | None = None, model: Model | None = None) -> xr.Dataset:
+def bounds(run: RunLike, tighter: RunLike | None = None, model: Model | None = None) -> xr.Dataset:
     """How far each peak of `summary` may be from the truth.
 
     Args:

@@ -8,13 +8,13 @@ import numpy as np
 
 from linkwise import _core
 from linkwise.base import Array
-from linkwise.results.samples import external, model_of, need_whole, rows
+from linkwise.loads.samples import external, model_of, need_whole, rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 
 def dissipated_power(model: Model, q: Array, v: Array) -> Array:
@@ -38,7 +38,7 @@ def external_power(model: Model, q: Array, v: Array, wrenches: Array | None) -> 
     return power
 
 
-def energy_balance(run: Run, model: Model | None = None) -> xr.Dataset:
+def energy_balance(run: RunLike, model: Model | None = None) -> xr.Dataset:
     """Energy, the work that went in, and what does not add up.
 
     Args:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from linkwise.base import Array
-from linkwise.results.samples import Selection, joint_names, model_of, need, rows, select
+from linkwise.loads.samples import Selection, joint_names, model_of, need, rows, select
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 
 class Quantity(NamedTuple):
@@ -82,11 +82,11 @@ def derive(load: Array, directions: Array) -> dict[str, Array]:
     }
 
 
-def has_power(run: Run) -> bool:
+def has_power(run: RunLike) -> bool:
     return "drive_torque" in run.dataset and "velocity" in run.dataset
 
 
-def drive_power(run: Run, found: Selection, where: slice) -> Array:
+def drive_power(run: RunLike, found: Selection, where: slice) -> Array:
     """Power of each joint's drive (time, joint) [W]."""
     each = rows(run, "drive_torque", where) * rows(run, "velocity", where)
     power = np.zeros((len(each), found.joints.size))
@@ -94,7 +94,9 @@ def drive_power(run: Run, found: Selection, where: slice) -> Array:
     return power
 
 
-def derived_rows(run: Run, found: Selection, directions: Array, where: slice) -> dict[str, Array]:
+def derived_rows(
+    run: RunLike, found: Selection, directions: Array, where: slice
+) -> dict[str, Array]:
     """All quantities of one block of samples, (time, joint) each."""
     values = derive(rows(run, "joint_load", where), directions)
     if has_power(run):
@@ -113,7 +115,7 @@ def quantity_attrs(name: str) -> dict[str, str]:
     }
 
 
-def quantities(run: Run, model: Model | None = None) -> xr.Dataset:
+def quantities(run: RunLike, model: Model | None = None) -> xr.Dataset:
     """Engineering quantities over time and joint, each with its convention in `attrs`.
 
     Args:

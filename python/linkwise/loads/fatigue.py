@@ -10,7 +10,7 @@ import numpy as np
 from linkwise._core import InputError
 from linkwise.base import COMPONENTS, Array
 from linkwise.loads.engineering import QUANTITIES, derive, drive_power, has_power, joint_directions
-from linkwise.results.samples import (
+from linkwise.loads.samples import (
     joint_names,
     joint_position,
     model_of,
@@ -24,13 +24,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 # Slopes of Woehler lines: welded steel, steel, cast iron and composites.
 EXPONENTS = (3.0, 5.0, 10.0)
 
 
-def signal(run: Run, joint: str, quantity: str, model: Model | None = None) -> tuple[Array, str]:
+def signal(
+    run: RunLike, joint: str, quantity: str, model: Model | None = None
+) -> tuple[Array, str]:
     """One quantity or component of one joint over time, and its unit."""
     need(run, "joint_load")
     k = joint_position(run, joint)
@@ -74,7 +76,7 @@ def _count(values: Array) -> Array:
     return np.array(counted, dtype=np.float64).reshape(-1, 3)
 
 
-def cycles(run: Run, joint: str, quantity: str, model: Model | None = None) -> xr.Dataset:
+def cycles(run: RunLike, joint: str, quantity: str, model: Model | None = None) -> xr.Dataset:
     """Rainflow cycles of one quantity or component of one joint.
 
     Returns:
@@ -105,7 +107,7 @@ def equivalent(ranges: Array, counts: Array, exponent: float, repetitions: float
 
 
 def damage_equivalent(
-    run: Run,
+    run: RunLike,
     exponents: Sequence[float] = EXPONENTS,
     repetitions: float | None = None,
     joints: Sequence[str] | None = None,
@@ -161,7 +163,7 @@ def damage_equivalent(
 
 
 def load_duration(
-    run: Run, joint: str, quantity: str, bins: int = 40, model: Model | None = None
+    run: RunLike, joint: str, quantity: str, bins: int = 40, model: Model | None = None
 ) -> xr.DataArray:
     """How long a quantity stays in each class of its range: (level) [s], classes of equal width."""
     import xarray as xr
@@ -185,7 +187,7 @@ def load_duration(
     )
 
 
-def spectrum(run: Run, joint: str, quantity: str, model: Model | None = None) -> xr.DataArray:
+def spectrum(run: RunLike, joint: str, quantity: str, model: Model | None = None) -> xr.DataArray:
     """One-sided power spectral density of a quantity about its mean: (frequency) [units^2/Hz].
 
     Periodogram with a Hann window; samples at unequal times are interpolated linearly first.

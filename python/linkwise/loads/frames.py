@@ -10,13 +10,13 @@ import numpy.typing as npt
 from linkwise import _core
 from linkwise._core import InputError
 from linkwise.base import Array
-from linkwise.results.samples import joint_names, model_of, need_whole, rows
+from linkwise.loads.samples import joint_names, model_of, need_whole, rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 Frame = Literal["child", "parent", "world"]
 _AXES = {
@@ -28,7 +28,7 @@ _AXES = {
 
 def _frames(model: Model, q: Array) -> tuple[Array, Array]:
     """Poses (time, joint, 4, 4) of the joints' frames and of their inboard bodies' frames."""
-    child = _core.body_poses(model, q)
+    child = _core.joint_poses(model, q)
     inboard = np.asarray(model.joint_parents)
     parent = child[:, np.maximum(inboard, 0)]
     parent[:, inboard < 0] = np.eye(4)
@@ -50,7 +50,7 @@ def move_wrench(load: Array, origin: Array, point: Array) -> Array:
 
 
 def in_frame(
-    run: Run,
+    run: RunLike,
     frame: Frame = "world",
     *,
     point: npt.ArrayLike | None = None,
@@ -107,7 +107,7 @@ def in_frame(
     return _labelled(run, load, {"frame": _AXES[frame], "point": where})
 
 
-def _labelled(run: Run, load: Array, attrs: dict[str, str]) -> xr.DataArray:
+def _labelled(run: RunLike, load: Array, attrs: dict[str, str]) -> xr.DataArray:
     import xarray as xr
 
     given = run.dataset["joint_load"]

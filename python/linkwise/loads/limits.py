@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.base import Array
-from linkwise.results.samples import blocks, rows
+from linkwise.loads.samples import blocks, rows
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 
-def _limited(run: Run, model: Model) -> list[tuple[str, int, float, float]]:
+def _limited(run: RunLike, model: Model) -> list[tuple[str, int, float, float]]:
     """Joint, column, lower and upper limit of joints with a finite limit and no stop."""
     names = run.dataset["joint"].values.tolist() if "joint" in run.dataset else model.joint_names
     sizes = dict(zip(model.joint_names, model.joint_nq, strict=True))
@@ -34,7 +34,7 @@ def _limited(run: Run, model: Model) -> list[tuple[str, int, float, float]]:
     return found if first == run.dataset["position"].shape[1] else []
 
 
-def beyond_limits(run: Run) -> list[dict[str, Any]]:
+def beyond_limits(run: RunLike) -> list[dict[str, Any]]:
     """Per joint beyond a limit: since when [s], and its farthest position there."""
     limited = _limited(run, run.load_model()) if "position" in run.dataset else []
     if not limited:

@@ -8,7 +8,7 @@ import numpy as np
 
 from linkwise.base import HALVES, Array
 from linkwise.loads.engineering import QUANTITIES, derived_rows, has_power, joint_directions
-from linkwise.results.samples import (
+from linkwise.loads.samples import (
     blocks,
     joint_names,
     model_of,
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 # A load counts as on duty above this share of its peak.
 DUTY_LEVEL = 0.1
@@ -73,7 +73,7 @@ def _with_neighbours(where: slice, count: int) -> slice:
     return slice(max(0, where.start - 1), min(count, where.stop + 1))
 
 
-def summary(run: Run, model: Model | None = None) -> xr.Dataset:
+def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
     """Per quantity and joint the peak, when, and the whole wrench at that moment.
 
     Args:
@@ -148,7 +148,7 @@ def summary(run: Run, model: Model | None = None) -> xr.Dataset:
     )
 
 
-def envelope(run: Run) -> xr.Dataset:
+def envelope(run: RunLike) -> xr.Dataset:
     """Smallest and largest value of every load component and when: (joint, component).
 
     Returns:
@@ -178,7 +178,7 @@ def envelope(run: Run) -> xr.Dataset:
     return xr.Dataset(data, coords=coords)
 
 
-def peak_loads(run: Run) -> xr.Dataset:
+def peak_loads(run: RunLike) -> xr.Dataset:
     """Largest force and moment that each joint carries, and when.
 
     Returns:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from linkwise import _core
 from linkwise.base import json_value
+from linkwise.io.writing import write_text
 from linkwise.paper import chains, guesses, other_codes, spectra, spread, state_choice, table2
 from linkwise.paper.claims import judge_all
 from linkwise.paper.published import INTEGRATOR_TOLERANCE, TOLERANCE_RATIO
@@ -101,7 +102,7 @@ def write_report(
     progress: Callable[[Step], object] | None = None,
 ) -> dict[str, Any]:
     """Compute everything and write index.html, tables.md and results.json to `directory`."""
-    folder = Path(directory)
+    folder = Path(os.path.abspath(directory))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -109,7 +110,7 @@ def write_report(
             f"{folder}: cannot be made a folder ({error.strerror}); name another"
         ) from None
     results = reproduce(quick=quick, seed=seed, progress=progress)
-    (folder / "results.json").write_text(_as_text(results), encoding="utf-8")
-    (folder / "tables.md").write_text(tables(results), encoding="utf-8")
-    (folder / "index.html").write_text(render(results), encoding="utf-8")
+    write_text(folder / "results.json", _as_text(results))
+    write_text(folder / "tables.md", tables(results))
+    write_text(folder / "index.html", render(results))
     return results

@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.io.writing import check_file, write_text
+from linkwise.loads.fatigue import damage_equivalent
+from linkwise.loads.peaks import envelope
 from linkwise.plot.report_figures import energy_figure, joint_figures, packed
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 # Joints with figures, the most loaded first: each takes some 200 kB.
 MOST_JOINTS = 16
@@ -127,9 +130,7 @@ def _margin_table(summary: xr.Dataset, left: xr.Dataset, limits: xr.Dataset | No
     return _table(["joint", "quantity", "peak", "rating", "use", "margin"], ordered, "named")
 
 
-def _envelope_table(run: Run) -> str:
-    from linkwise.loads.peaks import envelope
-
+def _envelope_table(run: RunLike) -> str:
     found = envelope(run)
     components = [str(c) for c in found["component"].values]
     headings = ["joint", *(f"{c} [{'N' if c[0] == 'f' else 'N m'}]" for c in components)]
@@ -146,9 +147,7 @@ def _envelope_table(run: Run) -> str:
     return _table(headings, rows)
 
 
-def _fatigue_table(run: Run, joints: list[str]) -> str:
-    from linkwise.loads.fatigue import damage_equivalent
-
+def _fatigue_table(run: RunLike, joints: list[str]) -> str:
     found = damage_equivalent(run, joints=joints)
     components = [str(c) for c in found["component"].values]
     rows = [
@@ -165,7 +164,7 @@ def _fatigue_table(run: Run, joints: list[str]) -> str:
     return _table(["joint", "exponent m", *components], rows)
 
 
-def _health(run: Run, limits: xr.Dataset | None) -> str:
+def _health(run: RunLike, limits: xr.Dataset | None) -> str:
     attrs = run.dataset.attrs
     options = json.loads(attrs.get("options", "{}"))
     facts = [
@@ -207,7 +206,7 @@ def script_json(value: Any) -> str:
 
 
 def write_report(
-    run: Run, path: str | os.PathLike[str], found: dict[str, Any], model: Model | None = None
+    run: RunLike, path: str | os.PathLike[str], found: dict[str, Any], model: Model | None = None
 ) -> Path:
     """Write the report of a run.
 
@@ -218,7 +217,8 @@ def write_report(
         model: The machine, if the run does not hold it.
     """
     plotly = _plotly()
-    target = Path(path)
+    target = Path(os.path.abspath(path))
+    check_file(target)
     summary, limits, left = found["summary"], found.get("bounds"), found.get("margins")
     names = [str(name) for name in summary["joint"].values]
     force = summary["peak"].sel(quantity="force").values
@@ -261,8 +261,5 @@ def write_report(
         f"<script type='application/json' id='figures'>{script_json(content)}</script>",
         f"<script>{plotly.offline.get_plotlyjs()}</script><script>{_SCRIPT}</script></body></html>\n",
     ]
-    try:
-        target.write_text("".join(parts), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{str(path)!r}: cannot write it ({error.strerror})") from None
+    write_text(target, "".join(parts))
     return target

@@ -17,13 +17,14 @@ import numpy.typing as npt
 from linkwise._core import InputError
 from linkwise.base import HALVES, Array
 from linkwise.loads.causes import Split, along_total
+from linkwise.loads.energy import energy_balance
 from linkwise.loads.engineering import derive, joint_directions
 from linkwise.loads.fatigue import load_duration, spectrum
-from linkwise.results.samples import blocks, joint_names, model_of, rows, select
+from linkwise.loads.samples import blocks, joint_names, model_of, rows, select
 
 if TYPE_CHECKING:
     from linkwise._core import Model
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 Figure = dict[str, Any]
 TIMES = "times"
@@ -122,7 +123,7 @@ def _polar(load: Array, direction: Array) -> Figure:
     }
 
 
-def _spectra(run: Run, joint: str, half: int) -> Figure:
+def _spectra(run: RunLike, joint: str, half: int) -> Figure:
     data = []
     kind, unit, components = HALVES[half]
     for component in components:
@@ -136,7 +137,7 @@ def _spectra(run: Run, joint: str, half: int) -> Figure:
     return {"data": data, "layout": layout}
 
 
-def _duration(run: Run, joint: str, model: Model) -> Figure:
+def _duration(run: RunLike, joint: str, model: Model) -> Figure:
     found = load_duration(run, joint, "force", model=model)
     trace = {
         "type": "bar",
@@ -148,7 +149,7 @@ def _duration(run: Run, joint: str, model: Model) -> Figure:
 
 
 def joint_figures(
-    run: Run, joints: list[str], every: int, model: Model | None
+    run: RunLike, joints: list[str], every: int, model: Model | None
 ) -> dict[str, list[Figure]]:
     """The figures of each joint, drawing one sample of `every`."""
     machine = model_of(run, model)
@@ -192,7 +193,7 @@ def _engineering(load: Array, direction: Array, half: int) -> Figure:
 
 
 def _thinned_shares(
-    run: Run, model: Model, every: int, where: list[int]
+    run: RunLike, model: Model, every: int, where: list[int]
 ) -> tuple[Array | None, list[str]]:
     try:
         split = Split(run, "force", model)
@@ -205,10 +206,8 @@ def _thinned_shares(
     return np.concatenate(parts), split.names
 
 
-def energy_figure(run: Run, every: int, model: Model | None) -> list[Figure]:
+def energy_figure(run: RunLike, every: int, model: Model | None) -> list[Figure]:
     """Energies and works, and what does not add up; nothing for runs without energies."""
-    from linkwise.loads.energy import energy_balance
-
     try:
         balance = energy_balance(run, model)
     except InputError:
@@ -226,7 +225,7 @@ def energy_figure(run: Run, every: int, model: Model | None) -> list[Figure]:
     ]
 
 
-def _steps(run: Run, every: int) -> Figure:
+def _steps(run: RunLike, every: int) -> Figure:
     layout = _layout("Integration step", "time [s]", "step [s]")
     layout["yaxis"]["type"] = "log"
     steps = run.dataset["step_size"].values[::every]

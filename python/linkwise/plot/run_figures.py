@@ -10,11 +10,11 @@ from linkwise._core import InputError
 from linkwise.base import HALVES
 from linkwise.loads.causes import along_total, split
 from linkwise.loads.energy import energy_balance
-from linkwise.results.samples import joint_position
+from linkwise.loads.samples import joint_position
 
 if TYPE_CHECKING:
     from linkwise.loads.causes import By
-    from linkwise.results import Run
+    from linkwise.loads.samples import RunLike
 
 
 def _figure(rows: int) -> tuple[Any, Any]:
@@ -33,7 +33,7 @@ def _figure(rows: int) -> tuple[Any, Any]:
 class RunPlots:
     """The figures of one run; every method returns the matplotlib Figure."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: RunLike) -> None:
         self._run = run
 
     def loads(self, joint: str) -> Any:

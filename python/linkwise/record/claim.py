@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import json
 import os
 from pathlib import Path
@@ -12,8 +11,11 @@ from typing import Any
 from linkwise._core import InputError
 from linkwise.record.provenance import FORMAT_KEY
 
-# None where the system is not POSIX: runs are then not protected from a second writer.
-fcntl: Any = importlib.import_module("fcntl") if importlib.util.find_spec("fcntl") else None
+fcntl: Any
+try:
+    import fcntl
+except ModuleNotFoundError:  # no POSIX: runs are not protected from a second writer
+    fcntl = None
 
 
 def is_run(path: Path) -> bool:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import os
-import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +13,7 @@ import numpy as np
 
 from linkwise._core import InputError
 from linkwise.base import blocks
+from linkwise.io.writing import csv_cell, written_whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,23 +23,6 @@ _TOGETHER = {
     "energy": ("kinetic_energy", "potential_energy"),
     "statistics": ("steps", "evaluations", "iterations", "step_size", "order"),
 }
-
-
-@contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    """A name beside `path` that becomes `path` when all went well: never half a file."""
-    if not path.parent.is_dir():
-        raise InputError(f"{str(path)!r}: folder {str(path.parent)!r} does not exist")
-    if path.is_dir():
-        raise InputError(f"{str(path)!r}: is a folder; give a file name")
-    aside = path.with_name(f".{path.name}.{secrets.token_hex(4)}.new")
-    try:
-        yield aside
-        os.replace(aside, path)
-    except OSError as error:
-        raise InputError(f"{str(path)!r}: cannot write it ({error.strerror or error})") from error
-    finally:
-        aside.unlink(missing_ok=True)
 
 
 def _blocks(variables: list[xr.DataArray]) -> Iterator[slice]:
@@ -54,8 +36,8 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """All variables, block by block: a stored run may be larger than memory."""
     import h5netcdf
 
-    target = Path(path)
-    with _replacing(target) as aside, h5netcdf.File(aside, "w") as file:
+    target = Path(os.path.abspath(path))
+    with written_whole(path) as aside, h5netcdf.File(aside, "w") as file:
         file.dimensions = {str(name): size for name, size in dataset.sizes.items()}
         file.attrs.update(dataset.attrs)
         for name, variable in dataset.variables.items():
@@ -114,9 +96,9 @@ def _columns(variable: xr.DataArray) -> list[str]:
 def _write_table(dataset: xr.Dataset, names: list[str], path: Path) -> None:
     variables = [dataset[name] for name in names]
     headings = ["time [s]", *(column for v in variables for column in _columns(v))]
-    with _replacing(path) as aside, open(aside, "w", newline="", encoding="utf-8") as file:
+    with written_whole(path) as aside, open(aside, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(headings)
+        table.writerow(map(csv_cell, headings))
         times = dataset["time"].values
         for where in _blocks(variables):
             # Lists of Python numbers print their shortest exact form.
@@ -128,7 +110,7 @@ def _write_table(dataset: xr.Dataset, names: list[str], path: Path) -> None:
 def write_csv(
     dataset: xr.Dataset, path: str | os.PathLike[str], quantity: str | None
 ) -> list[Path]:
-    target = Path(path)
+    target = Path(os.path.abspath(path))
     shared = {name: group for group, names in _TOGETHER.items() for name in names}
     tables: dict[str, list[str]] = {}
     for key in dataset.data_vars:

@@ -8,14 +8,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from linkwise._core import InputError
-
-if TYPE_CHECKING:
-    from linkwise._core import Model
+from linkwise._core import InputError, Model
 
 GROUP = "machine"
 ARRAY = "description"
@@ -44,8 +40,6 @@ def write_model(store: Path, model: Model) -> None:
 def read_model(store: str | os.PathLike[str]) -> Model:
     """The model that the run at `store` simulated; InputError if the run does not hold it."""
     import zarr
-
-    from linkwise._core import Model
 
     shown = f"run {os.fspath(store)!r}"
     if not (Path(store) / GROUP).is_dir():

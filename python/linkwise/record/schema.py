@@ -141,7 +141,7 @@ def _joint_variables(
 ) -> tuple[list[Variable], dict[str, Coordinate]]:
     """What is recorded per joint, coordinate or degree of freedom, with its labels."""
     positions, velocities = joint_scalars(model, selected)
-    joint_names, body_names = model.joint_names, model.body_names  # lists made on every access
+    joint_names, children = model.joint_names, model.child_link_names  # lists made on every access
     names = text_array(joint_names[k] for k in selected)
     one_each = np.array_equal(positions.labels, names) and np.array_equal(velocities.labels, names)
     q_dim, v_dim = ("joint", "joint") if one_each else ("coordinate", "dof")
@@ -163,7 +163,7 @@ def _joint_variables(
         variables.append(_scalar_variable(row, dim, scalars, whole, coordinates))
         coordinates[dim] = Coordinate((dim,), scalars.labels)
     if "joint" in coordinates:
-        bodies = text_array(body_names[k] for k in selected)
+        bodies = text_array(children[k] for k in selected)
         about = {"long_name": "outboard body of the joint"}
         coordinates["body"] = Coordinate(("joint",), bodies, about)
     return variables, coordinates
@@ -176,7 +176,7 @@ def _body_variables(
     coordinates: dict[str, Coordinate],
 ) -> list[Variable]:
     """Wrenches on the bodies that have any; the others would be columns of zeros."""
-    names = model.body_names
+    names = model.child_link_names
     bodies = [k for k in range(model.n_joints) if names[k] in wrenched]
     labels = text_array(names[k] for k in bodies)
     coordinates["wrenched_body"] = Coordinate(("wrenched_body",), labels)

@@ -23,6 +23,7 @@ from linkwise.base import AnyArray
 from linkwise.record.claim import check_target, hold, release
 from linkwise.record.machine import write_model
 from linkwise.record.provenance import plain
+from linkwise.record.read import open_dataset
 from linkwise.record.schema import TIME_ATTRS, Coordinate, Schema, Variable
 
 if TYPE_CHECKING:
@@ -195,8 +196,6 @@ class RunWriter:
 
     def finish(self, attrs: Mapping[str, Any]) -> xr.Dataset:
         """Write what waits and the final attributes; return the opened results."""
-        from linkwise.record.read import open_dataset
-
         try:
             self.flush()
             self._group.update_attributes({name: plain(value) for name, value in attrs.items()})

@@ -1,4 +1,4 @@
-"""Results of simulations: `Run`, opening stored ones, and reading their samples block by block."""
+"""Results of simulations: `Run`, and opening stored ones."""
 
 from linkwise.results.open import open_run
 from linkwise.results.run import Run

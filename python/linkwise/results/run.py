@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from linkwise._core import InputError
+from linkwise.loads.peaks import peak_loads
+from linkwise.plot.run_figures import RunPlots
+from linkwise.record.export import write_csv, write_netcdf
+from linkwise.record.machine import read_model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -113,27 +116,20 @@ class Run:
         if self._model is None:
             if self.path is None:
                 raise InputError("run does not hold its model; give the model as well")
-            from linkwise.record.machine import read_model
-
             self._model = read_model(self.path)
         return self._model
 
-    # Loads and figures are functions of a run, in rooms above this one: imported when asked for.
-
     @property
-    def plot(self) -> Any:
+    def plot(self) -> RunPlots:
         """Figures of this run: `run.plot.loads("elbow")`, `.split("elbow")`, `.energy()`."""
-        return import_module("linkwise.plot").RunPlots(self)
+        return RunPlots(self)
 
     def peak_loads(self) -> xr.Dataset:
         """Largest force and moment of each joint, and when: `linkwise.loads.peak_loads`."""
-        found: xr.Dataset = import_module("linkwise.loads").peak_loads(self)
-        return found
+        return peak_loads(self)
 
     def to_netcdf(self, path: str | os.PathLike[str]) -> Path:
         """Write everything to one NetCDF-4 file (also an HDF5 file); replaces an existing file."""
-        from linkwise.record.export import write_netcdf
-
         return write_netcdf(self.dataset, path)
 
     def to_csv(self, path: str | os.PathLike[str], quantity: str | None = None) -> list[Path]:
@@ -146,6 +142,4 @@ class Run:
         Returns:
             The files written.
         """
-        from linkwise.record.export import write_csv
-
         return write_csv(self.dataset, path, quantity)

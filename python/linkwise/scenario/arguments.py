@@ -215,14 +215,14 @@ class ArgumentBuilder:
 
     def body_wrenches(self) -> dict[str, drives.Wrench]:
         """External wrenches by body name."""
-        bodies = set(self.model.body_names) | set(self.model.link_names)
+        bodies = set(self.model.child_link_names) | set(self.model.link_names)
         result = {}
         for body, section in self.source.settings.wrench.items():
             if body not in bodies:
                 self.source.complain(
                     ("wrench", body),
                     "the model has no such body",
-                    near(body, self.model.body_names, "the bodies are"),
+                    near(body, self.model.child_link_names, "the bodies are"),
                 )
             result[body] = self._wrench(section, ("wrench", body))
         return result

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 
 from pydantic import ValidationError
 
+from linkwise import scenes
 from linkwise._core import InputError, Model
 from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.files import SCENARIO_BYTES, read_bytes
@@ -84,8 +85,6 @@ class Scenario(ScenarioSource):
         }
 
     def _scene(self, kind: str, options: dict[str, Any]) -> Model:
-        from linkwise import scenes
-
         function: Callable[..., Model] = getattr(scenes, kind)
         known = inspect.signature(function).parameters
         for name in options:

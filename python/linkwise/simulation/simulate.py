@@ -15,11 +15,12 @@ import numpy.typing as npt
 from linkwise import _core
 from linkwise._core import InputError
 from linkwise.drives import Motion, as_drive, as_wrench
-from linkwise.io.complaint import near, shorten
+from linkwise.io.complaint import near
 from linkwise.record.claim import check_target
 from linkwise.record.memory import MemoryRecord
 from linkwise.record.provenance import describe, provenance
 from linkwise.record.schema import Schema, build_schema
+from linkwise.record.store import RunWriter
 from linkwise.results import Run
 from linkwise.simulation.arguments import optional_count, sample_times, state_vector
 from linkwise.simulation.numerics import DEFAULTS, Numerics
@@ -28,24 +29,27 @@ from linkwise.simulation.time_loop import Ending, Progress, run_time_loop
 if TYPE_CHECKING:
     from linkwise._core import Model, Simulation
     from linkwise.drives import Drive, Wrench
-    from linkwise.record.store import RunWriter
-    from linkwise.scenario import Scenario
 
 
-class SimulationError(RuntimeError):
+class _Stopped(BaseException):
+    """A simulation that ended early, with the run until then; pickles and copies whole."""
+
+    def __init__(self, message: str, run: Run) -> None:
+        super().__init__(message)
+        self.run = run
+
+    def __reduce__(self) -> tuple[type[_Stopped], tuple[str, Run]]:
+        # Exceptions are rebuilt from `args`, which is what they print: the message alone. One that
+        # cannot be rebuilt ends the thread of a process pool that reads it, and the pool hangs.
+        return type(self), (str(self), self.run)
+
+
+class SimulationError(_Stopped, RuntimeError):
     """A simulation that could not go on; `run` holds everything until then."""
 
-    def __init__(self, message: str, run: Run) -> None:
-        super().__init__(message)
-        self.run = run
 
-
-class SimulationInterrupted(KeyboardInterrupt):
+class SimulationInterrupted(_Stopped, KeyboardInterrupt):
     """Ctrl-C during a simulation; `run` holds everything until then."""
-
-    def __init__(self, message: str, run: Run) -> None:
-        super().__init__(message)
-        self.run = run
 
 
 def check_driven(
@@ -59,10 +63,11 @@ def check_driven(
             by_joint[joint] = as_drive(drive)
         except InputError as error:
             raise InputError(f"drives[{joint!r}]: {error}") from None
-    bodies = {*model.body_names, *model.link_names} if wrenches else set()
+    bodies = {*model.child_link_names, *model.link_names} if wrenches else set()
     for body, wrench in (wrenches or {}).items():
         if body not in bodies:
-            raise InputError(f"wrenches: unknown body {body!r}; {near(body, model.body_names)}")
+            known = near(body, model.child_link_names)
+            raise InputError(f"wrenches: unknown body {body!r}; {known}")
         try:
             by_body[body] = as_wrench(wrench)
         except InputError as error:
@@ -110,8 +115,6 @@ def _recorder(
 ) -> MemoryRecord | RunWriter:
     if output is None:
         return MemoryRecord(schema, attrs)
-    from linkwise.record.store import RunWriter
-
     return RunWriter(output, schema, attrs, samples=samples, model=model)
 
 
@@ -290,30 +293,3 @@ def raise_failure(model: Model, ending: Ending, run: Run) -> None:
         raise SimulationInterrupted(f"{ending.message}{where}", run)
     if ending.outcome != "converged":
         raise SimulationError(failure_message(model, ending), run)
-
-
-def run_scenario(
-    scenario: Scenario | str | os.PathLike[str],
-    *,
-    output: str | os.PathLike[str] | None = None,
-    progress: Callable[[Progress], object] | None = None,
-    on_failure: Literal["raise", "return"] = "raise",
-) -> Run:
-    """Simulate a scenario, given as a file or as `load_scenario` returned it.
-
-    `output` overrides the scenario's own `[output] path`; without either the run stays in memory.
-    See `simulate` for the rest.
-    """
-    from linkwise.scenario import Scenario, load_scenario
-
-    loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
-    model = loaded.load_model()
-    arguments = loaded.simulate_arguments(model)
-    if output is not None:
-        arguments["output"] = output
-    if arguments["output"] is not None:
-        check_target(arguments["output"])
-    try:
-        return simulate(model, **arguments, progress=progress, on_failure=on_failure)
-    except InputError as error:
-        raise InputError(f"{shorten(loaded.path, 400)}: {error}") from None

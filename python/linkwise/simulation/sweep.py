@@ -10,19 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.scenario import Scenario, load_scenario, variant
+from linkwise.simulation.simulate import simulate
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from linkwise.scenario import Scenario
 
 MOST_MEMBERS = 10_000
 
 
 def _simulate(scenario: Scenario) -> xr.Dataset:
     """One member, in a process of its own; its samples in memory."""
-    from linkwise.simulation.simulate import simulate
-
     model = scenario.load_model()
     arguments = scenario.simulate_arguments(model)
     arguments["output"] = None
@@ -67,8 +65,6 @@ def sweep(
         InputError: a member is wrong; nothing was simulated.
     """
     import xarray as xr
-
-    from linkwise.scenario import Scenario, load_scenario, variant
 
     base = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     for key, values in axes.items():

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from linkwise import _core
 from linkwise._core import InputError
 from linkwise.base import Array
+from linkwise.io import writing
 from linkwise.view import arrows
 from linkwise.view.live import View
 from linkwise.view.panel import legend
@@ -91,14 +92,11 @@ class Blob:
 
 def check_file(path: str | os.PathLike[str]) -> Path:
     """The path of an HTML file that can be written, or InputError."""
-    file = Path(path)
+    file = Path(os.path.abspath(path))
     shown = f"export {str(path)!r}"
     if file.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{shown}: is an HTML file; give a name that ends in .html")
-    if not file.parent.is_dir():
-        raise InputError(f"{shown}: folder {str(file.parent)!r} does not exist; create it first")
-    if file.is_dir() or not os.access(file if file.exists() else file.parent, os.W_OK):
-        raise InputError(f"{shown}: cannot be written; choose another path")
+    writing.check_file(file)
     return file
 
 
@@ -129,14 +127,9 @@ def write_html(
         blob = Blob()
         content["messages"] = replay(server, blob.parts)
     page = _page(source.title, blob, content)
-    try:
-        file.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            f"export {str(path)!r}: cannot be written ({error.strerror}); choose another path"
-        ) from None
+    writing.write_text(file, page)
     duration = float(animation.times[-1] - animation.times[0])
-    return Exported(file, animation.times.size, duration, file.stat().st_size)
+    return Exported(Path(path), animation.times.size, duration, len(page.encode("utf-8")))
 
 
 def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
@@ -145,10 +138,10 @@ def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
     A body is named after one of its links, whose frame is the joint's in most files: two frames of
     one rigid body that agree in one position agree in all.
     """
-    links, joints = _core.link_poses(model, q), _core.body_poses(model, q)
+    links, joints = _core.link_poses(model, q), _core.joint_poses(model, q)
     index = {name: k for k, name in enumerate(model.link_names)}
     found = np.full(len(links), -1)
-    for joint, body in enumerate(model.body_names):
+    for joint, body in enumerate(model.child_link_names):
         if np.array_equal(links[index[body]], joints[joint]):
             found[index[body]] = joint
     others = np.flatnonzero(found < 0)
@@ -158,7 +151,7 @@ def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
 
 def _poses(model: Model, q: Array, link_poses: npt.NDArray[np.int64]) -> Array:
     links = _core.link_poses(model, q)[link_poses >= model.n_joints]
-    frames = np.concatenate([_core.body_poses(model, q), links])
+    frames = np.concatenate([_core.joint_poses(model, q), links])
     return np.concatenate([frames[:, :3, 3], quaternions(frames[:, :3, :3])], axis=1)
 
 

@@ -101,7 +101,7 @@ class Scene:
 
     def at(self, q: Array, loads: Array | None) -> Snapshot:
         links = _core.link_poses(self._model, q)
-        return Snapshot(links, _core.body_poses(self._model, q), loads)
+        return Snapshot(links, _core.joint_poses(self._model, q), loads)
 
     def show(self, snapshot: Snapshot) -> None:
         self._snapshot = snapshot
@@ -378,7 +378,7 @@ def _stays_near(snapshot: Snapshot, model: _core.Model, edges: Array, offsets: A
     far behind the joint: true to the numbers, but no picture of the link.
     """
     names = {name: k for k, name in enumerate(model.link_names)}
-    link_of = np.array([names[name] for name in model.body_names], dtype=int)
+    link_of = np.array([names[name] for name in model.child_link_names], dtype=int)
     inboard = np.array(model.joint_parents, dtype=int)
     points = snapshot.joints[:, :3, 3]
     outboard = np.flatnonzero(inboard >= 0)

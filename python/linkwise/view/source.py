@@ -13,14 +13,16 @@ import numpy as np
 from linkwise._core import InputError, Model, inverse_dynamics_loads
 from linkwise.base import Array, rows_per_block
 from linkwise.io.complaint import near
+from linkwise.io.load import load
 from linkwise.io.urdf_visuals import Appearance, read_appearance
-from linkwise.results.samples import rows
+from linkwise.loads.samples import rows
+from linkwise.record.machine import read_model
+from linkwise.results import Run, open_run
 from linkwise.scenario import load_ratings, load_scenario, ratings_in
 from linkwise.view.shown_loads import CauseLoads
 
 if TYPE_CHECKING:
     from linkwise.loads.rating import Rating
-    from linkwise.results import Run
 
 PathLike = str | os.PathLike[str]
 
@@ -167,8 +169,6 @@ def _ratings(options: Options, scenario: str) -> Mapping[str, Rating]:
 
 def _load_model(path: Path, options: Options) -> tuple[Model, Path | None, Sequence[Path]]:
     """The model of a file, the file that may say how it looks, and where its packages are."""
-    from linkwise.io.load import load
-
     if path.suffix.lower() != ".toml":
         model = load(
             path,
@@ -185,9 +185,6 @@ def _load_model(path: Path, options: Options) -> tuple[Model, Path | None, Seque
 
 
 def _open_run(path: Path, options: Options) -> Source:
-    from linkwise.record.machine import read_model
-    from linkwise.results import open_run
-
     run = open_run(path)
     if options.model is not None:
         model, file, package_dirs = _load_model(options.model, options)

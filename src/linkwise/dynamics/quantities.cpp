@@ -50,7 +50,7 @@ std::vector<BodyState<double>> states_of(const Model& model, const double* q, co
 
 }  // namespace
 
-void body_poses(const Model& model, const double* q, double* poses) {
+void joint_poses(const Model& model, const double* q, double* poses) {
   const auto frames = element_frames(model, q);
   for (int j = 0; j < model.n_joints(); ++j)
     store_pose(joint_frame(model.joints[j], frames), poses + 16 * j);

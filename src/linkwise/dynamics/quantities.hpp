@@ -6,7 +6,7 @@
 namespace linkwise {
 
 /// Pose of every joint's outboard (user) frame in the world, row-major 4x4 each, [n_joints][16].
-void body_poses(const Model& model, const double* q, double* poses);
+void joint_poses(const Model& model, const double* q, double* poses);
 /// Pose of every link of the file, merged ones too, [n_links][16].
 void link_poses(const Model& model, const double* q, double* poses);
 /// 6 x nv, row-major: v of joint `joint`'s outboard frame in its own axes, linear first, = J u.

@@ -34,7 +34,7 @@ void AppliedForces::evaluate(double t, const double* q, const double* v) {
     std::copy_n(tau, nv_, drive_.data() + i * nv_);
     add_passive_forces(m, q, v, tau);
     if (external_.empty()) continue;
-    if (world_wrenches_) body_poses(m, q, poses_.data());
+    if (world_wrenches_) joint_poses(m, q, poses_.data());
     add_wrenches(m, setup_.wrenches, t, poses_.data(), external_.data() + i * n_load_);
   }
 }

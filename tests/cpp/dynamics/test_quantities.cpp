@@ -30,7 +30,7 @@ std::vector<double> flat(const Pose<double>& pose) {
 
 TEST_P(Quantities, PosesAreTheTwins) {
   std::vector<double> joints(16 * model.n_joints()), links(16 * model.links.size());
-  body_poses(model, state.q.data(), joints.data());
+  joint_poses(model, state.q.data(), joints.data());
   link_poses(model, state.q.data(), links.data());
   const auto part = [](const std::vector<double>& all, size_t i) {
     return std::vector<double>(all.begin() + 16 * i, all.begin() + 16 * (i + 1));
@@ -106,7 +106,7 @@ TEST(Axes, OfEveryDirectionAreTurnedAbout) {
     const WorldTwin twin(model);
     for (const std::vector<double>& q : {std::vector<double>{0, 0}, {1.2, -0.7}}) {
       std::vector<double> poses(32);
-      body_poses(model, q.data(), poses.data());
+      joint_poses(model, q.data(), poses.data());
       const auto want = twin.motions(q, std::vector<double>(2));
       for (int j = 0; j < 2; ++j) {
         const std::vector<double> pose(poses.begin() + 16 * j, poses.begin() + 16 * (j + 1));

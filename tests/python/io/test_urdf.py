@@ -17,7 +17,7 @@ def test_reads_joints_limits_and_passive_forces(arm):
     assert model.source == str(arm)
     assert model.joint_names == ["shoulder", "slide"]
     assert model.joint_types == ["revolute", "prismatic"]
-    assert model.body_names == ["upper", "lower"]
+    assert model.child_link_names == ["upper", "lower"]
     assert model.total_mass == pytest.approx(3.0)
     np.testing.assert_array_equal(model.lower_limit, [-1, 0])
     np.testing.assert_array_equal(model.upper_limit, [2, 0.5])
@@ -36,7 +36,7 @@ def test_links_without_mass_are_joints_and_no_bodies(arm):
     model = lw.load(arm)
     assert (model.n_joints, model.n_bodies) == (2, 1)
     assert lw.joint_loads(model, [0.1, 0.2], [0, 0], [0, 0]).shape == (model.n_joints, 6)
-    assert model.body_masses.tolist() == [0, 1]
+    assert model.child_link_masses.tolist() == [0, 1]
 
 
 def test_gravity_is_an_argument(arm, complaint):

@@ -68,7 +68,7 @@ def test_frames_there_and_back(swing):
     model = swing.load_model()
     child = lw.loads.in_frame(swing, "child")
     np.testing.assert_allclose(child, load, atol=1e-13 * scale)
-    poses = lw.body_poses(model, swing.position.values)
+    poses = lw.joint_poses(model, swing.position.values)
     world = lw.loads.in_frame(swing, "world").values
     for half in (slice(0, 3), slice(3, 6)):
         back = np.einsum("tjki,tjk->tji", poses[..., :3, :3], world[..., half])
@@ -87,7 +87,7 @@ def test_about_another_point(swing, frame, fixed_in):
     """n_P = n_O + (O - P) x f, with everything in the world's axes; forces do not change."""
     point = np.array([0.3, -0.2, 0.5])
     model = swing.load_model()
-    poses = lw.body_poses(model, swing.position.values)
+    poses = lw.joint_poses(model, swing.position.values)
     about = {"child": poses, "world": np.broadcast_to(np.eye(4), poses.shape)}
     about["parent"] = np.concatenate(
         [np.broadcast_to(np.eye(4), poses[:, :1].shape), poses[:, :-1]], axis=1

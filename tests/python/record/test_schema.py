@@ -124,9 +124,9 @@ def test_quantities_select_variables():
 def test_wrenches_are_recorded_of_wrenched_bodies_alone():
     model = build(("a", "revolute"), ("b", "revolute"))
     assert "external_wrench" not in build_schema(model).quantities
-    made = build_schema(model, ["external_wrench"], wrenched=[model.body_names[1]])
+    made = build_schema(model, ["external_wrench"], wrenched=[model.child_link_names[1]])
     assert variable(made, "external_wrench").shape == (1, 6)
-    assert made.coordinates["wrenched_body"].values.tolist() == [model.body_names[1]]
+    assert made.coordinates["wrenched_body"].values.tolist() == [model.child_link_names[1]]
 
 
 @pytest.mark.parametrize(

@@ -374,9 +374,9 @@ def test_run_scenario(tmp_path):
         "[model.chain]\nn_bodies = 2\n[initial]\nposition.joint_1 = 0.5\n"
         "[simulate]\nduration = 1.0\n[output]\nevery = 0.1\npath = 'out.zarr'\n"
     )
-    run = simulate.run_scenario(path)
+    run = lw.run_scenario(path)
     assert run.path == tmp_path / "out.zarr"
     assert run.attrs["scenario"] == path.read_text()
     direct = lw.simulate(lw.scenes.chain(2), duration=1.0, every=0.1, q0=[0.5, 0])
     xr.testing.assert_equal(run.dataset, direct.dataset)
-    assert simulate.run_scenario(path, output=tmp_path / "x.zarr").path == tmp_path / "x.zarr"
+    assert lw.run_scenario(path, output=tmp_path / "x.zarr").path == tmp_path / "x.zarr"

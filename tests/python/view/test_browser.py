@@ -105,7 +105,7 @@ def joint_pixels(source, q):
     forward = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(forward, [0, 0, 1])
     right /= np.linalg.norm(right)
-    seen = lw.body_poses(source.model, q)[:, :3, 3] - eye
+    seen = lw.joint_poses(source.model, q)[:, :3, 3] - eye
     across, up, depth = (seen @ axis for axis in (right, np.cross(right, forward), forward))
     scale = WINDOW["height"] / 2 / np.tan(angle / 2)
     columns = WINDOW["width"] / 2 + scale * across / depth - SCENE["x"]

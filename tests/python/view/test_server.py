@@ -86,7 +86,7 @@ def work_of_a_picture(n):
         finally:
             sys.setprofile(before)
     marks = scene.joint_marks.batched_positions
-    assert marks == pytest.approx(lw.body_poses(model, q)[:, :3, 3], rel=1e-6, abs=1e-3)
+    assert marks == pytest.approx(lw.joint_poses(model, q)[:, :3, 3], rel=1e-6, abs=1e-3)
     return len(calls), len(sent)
 
 
@@ -103,7 +103,7 @@ def test_the_first_picture_has_room_for_the_whole_run(tmp_path):
     with running("127.0.0.1", 0, "fall") as server:
         scene = Scene(server, source)
     for sample in range(source.recording.times.size):
-        points = lw.body_poses(chain, source.recording.position(sample))[:, :3, 3]
+        points = lw.joint_poses(chain, source.recording.position(sample))[:, :3, 3]
         assert (np.abs(points - scene.center) < 0.6 * scene.size).all()
 
 

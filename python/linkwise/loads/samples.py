@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -16,11 +17,28 @@ from linkwise.base import Array
 from linkwise.io.complaint import near
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from linkwise._core import Model
-    from linkwise.results.run import Run
 
 
-def need(run: Run, *names: str) -> None:
+class RunLike(Protocol):
+    """What functions of a run need of it; `linkwise.Run` has it.
+
+    dataset: samples with names and units; path: where it is stored, None for one in memory;
+    outcome: "converged", or how it ended instead; load_model: the machine that was simulated.
+    """
+
+    @property
+    def dataset(self) -> xr.Dataset: ...
+    @property
+    def path(self) -> Path | None: ...
+    @property
+    def outcome(self) -> str: ...
+    def load_model(self) -> Model: ...
+
+
+def need(run: RunLike, *names: str) -> None:
     """InputError where the run lacks one of these variables, or samples."""
     for name in names:
         if name not in run.dataset:
@@ -29,13 +47,13 @@ def need(run: Run, *names: str) -> None:
         raise InputError("run holds no samples: it stopped before the first was written")
 
 
-def joint_names(run: Run) -> list[str]:
+def joint_names(run: RunLike) -> list[str]:
     """The joints whose loads the run holds."""
     need(run, "joint_load")
     return [str(name) for name in run.dataset["joint"].values]
 
 
-def joint_position(run: Run, joint: str) -> int:
+def joint_position(run: RunLike, joint: str) -> int:
     """Which of the recorded joints this is."""
     names = joint_names(run)
     if joint not in names:
@@ -43,7 +61,7 @@ def joint_position(run: Run, joint: str) -> int:
     return names.index(joint)
 
 
-def model_of(run: Run, model: Model | None) -> Model:
+def model_of(run: RunLike, model: Model | None) -> Model:
     """The machine of the run: the one given, checked, or the one inside the run."""
     if model is None:
         return run.load_model()
@@ -68,14 +86,14 @@ class Selection:
         return bool(self.joints.size == self.model.n_joints)
 
 
-def select(run: Run, model: Model) -> Selection:
+def select(run: RunLike, model: Model) -> Selection:
     where = {name: k for k, name in enumerate(model.joint_names)}
     joints = np.array([where[name] for name in joint_names(run)], dtype=np.intp)
     nv = np.asarray(model.joint_nv, dtype=np.intp)[joints]
     return Selection(model, joints, np.repeat(np.arange(joints.size), nv))
 
 
-def need_whole(run: Run, model: Model, *names: str) -> Selection:
+def need_whole(run: RunLike, model: Model, *names: str) -> Selection:
     """The selection of a run that holds these quantities of every joint."""
     need(run, *names)
     found = select(run, model)
@@ -87,12 +105,12 @@ def need_whole(run: Run, model: Model, *names: str) -> Selection:
     return found
 
 
-def blocks(run: Run, row_bytes: int) -> Iterator[slice]:
+def blocks(run: RunLike, row_bytes: int) -> Iterator[slice]:
     """Slices of time whose rows fit into memory."""
     return base.blocks(run.dataset.sizes["time"], row_bytes)
 
 
-def rows(run: Run, name: str, where: slice | Sequence[int]) -> Array:
+def rows(run: RunLike, name: str, where: slice | Sequence[int]) -> Array:
     """A variable's rows as (time, ...) in the model's order.
 
     Raises InputError where the files are damaged or a joint load is not a number.
@@ -118,7 +136,7 @@ def rows(run: Run, name: str, where: slice | Sequence[int]) -> Array:
     return found
 
 
-def external(run: Run, model: Model, where: slice | Sequence[int]) -> Array | None:
+def external(run: RunLike, model: Model, where: slice | Sequence[int]) -> Array | None:
     """The wrenches on all bodies (time, body, 6), None where there are none.
 
     A run with wrenches that did not record them cannot be evaluated again.
@@ -128,14 +146,14 @@ def external(run: Run, model: Model, where: slice | Sequence[int]) -> Array | No
             raise InputError('run holds no external_wrench; record the quantity "external_wrench"')
         return None
     given = run.dataset["external_wrench"]
-    bodies = {name: k for k, name in enumerate(model.body_names)}
+    bodies = {name: k for k, name in enumerate(model.child_link_names)}
     values = rows(run, "external_wrench", where)
     whole = np.zeros((len(values), model.n_joints, 6))
     whole[:, [bodies[str(name)] for name in given["wrenched_body"].values]] = values
     return whole
 
 
-def drive_kinds(run: Run) -> dict[str, str] | None:
+def drive_kinds(run: RunLike) -> dict[str, str] | None:
     """The kind of each joint's drive, for those that have one; None where the run does not say."""
     told = run.dataset.attrs.get("drives")
     if told is None:
@@ -144,7 +162,7 @@ def drive_kinds(run: Run) -> dict[str, str] | None:
     return {joint: str(drive.get("kind")) for joint, drive in drives.items()}
 
 
-def given_motions(run: Run) -> dict[str, str]:
+def given_motions(run: RunLike) -> dict[str, str]:
     """The joints whose motion was given, "locked" or "motion"."""
     kinds = drive_kinds(run) or {}
     return {joint: kind for joint, kind in kinds.items() if kind in ("locked", "motion")}
