@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from typing import Annotated, NoReturn
 
 import typer
@@ -104,8 +105,14 @@ def _exit_code() -> int:
     return result if isinstance(result, int) else DONE
 
 
+def _warn(message: Warning | str, *_: object, **__: object) -> None:
+    """One line, without the place in the sources that Python adds."""
+    say(f"warning: {message}")
+
+
 def main() -> NoReturn:
     """Run the command line of this process and exit."""
+    warnings.showwarning = _warn
     try:
         code = _exit_code()
         sys.stdout.flush()

@@ -6,6 +6,7 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -72,6 +73,14 @@ def text(value: object) -> str:
     from rich.markup import escape
 
     return escape("".join(c if c.isprintable() else "?" for c in str(value)))
+
+
+def shown_path(path: object) -> str:
+    """A path as short as it means the same from this folder."""
+    try:
+        return str(Path(str(path)).relative_to(Path.cwd()))
+    except (OSError, ValueError):
+        return str(path)
 
 
 def number(value: float, digits: int = 4) -> str:

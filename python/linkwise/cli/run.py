@@ -17,6 +17,7 @@ from linkwise.cli.output import (
     peak_table,
     print_json,
     say,
+    shown_path,
 )
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def summary(run: Run) -> dict[str, Any]:
     counts = ("total_steps", "total_evaluations", "total_iterations")
     chosen = ("model", "model_hash", "method", "solver", "reason")
     found = {name: attrs.get(name) for name in (*names, *chosen, *counts)}
-    found["run"] = str(run.path) if run.path is not None else None
+    found["run"] = shown_path(run.path) if run.path is not None else None
     found["samples"] = run.dataset.sizes["time"]
     return found
 
@@ -101,7 +102,7 @@ def show_run(run: Run, as_json: bool) -> None:
     )
     if beyond:
         screen.print(_limit_note(beyond), markup=False)
-    screen.print(f"Results: {run.path}", markup=False)
+    screen.print(f"Results: {shown_path(run.path)}", markup=False)
 
 
 def _limit_note(beyond: Sequence[Mapping[str, Any]]) -> str:

@@ -120,6 +120,8 @@ def rows(run: RunLike, name: str, where: slice | Sequence[int]) -> Array:
     shown = f"run {str(run.path)!r}" if run.path is not None else "run"
     try:
         values = variable.transpose("time", *last)[where].values
+    except InputError:  # a ValueError; it names the file
+        raise
     except (RuntimeError, OSError, ValueError) as error:
         why = " ".join(str(error).split())
         raise InputError(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwise._core import InputError
+from linkwise.io.files import read_bytes
 from linkwise.record.provenance import FORMAT_KEY
 
 fcntl: Any
@@ -18,14 +19,22 @@ except ModuleNotFoundError:  # no POSIX: runs are not protected from a second wr
     fcntl = None
 
 
+MOST_ATTRIBUTES = 16 << 20
+
+
+def run_attributes(path: Path) -> dict[str, Any] | None:
+    """The attributes of the linkwise run at `path`, None where there is no such run."""
+    try:
+        content = json.loads(read_bytes(path / "zarr.json", "run", MOST_ATTRIBUTES))
+        attrs: dict[str, Any] = content["attributes"]
+        return attrs if FORMAT_KEY in attrs else None
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
 def is_run(path: Path) -> bool:
     """Whether `path` is a linkwise run, judged by the attributes of its Zarr group."""
-    try:
-        with open(path / "zarr.json", "rb") as file:
-            content = json.loads(file.read(16 << 20))
-        return FORMAT_KEY in content["attributes"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
+    return run_attributes(path) is not None
 
 
 def hold(path: Path) -> int | None:

@@ -8,10 +8,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path, PurePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwise._core import InputError, Model
+from linkwise.record.checksums import damage, reason
+
+if TYPE_CHECKING:
+    import zarr
 
 GROUP = "machine"
 ARRAY = "description"
@@ -20,40 +25,48 @@ MOST_BYTES = 64 << 20
 _CHUNK_BYTES = 4 << 20
 
 
-def write_model(store: Path, model: Model) -> None:
-    """Put the description of `model` into the run at `store`, unless it is too long."""
-    import zarr
-
+def write_model(run: zarr.Group, model: Model) -> None:
+    """Put the description of `model` into the group of a run, unless it is too long."""
     if model.n_joints > MOST_BYTES // 100:  # no link takes fewer bytes: spare the work
         return
     name = PurePath(model.source).name if model.source else ""
+    from linkwise.record.checked_store import packing
+
     content = np.frombuffer(model.to_bytes(source=name), dtype=np.uint8)
     if content.size > MOST_BYTES:
         return
-    group = zarr.open_group(store / GROUP, mode="w", zarr_format=3)
-    array = group.create_array(
-        ARRAY, shape=content.shape, chunks=(min(content.size, _CHUNK_BYTES),), dtype="uint8"
+    array = run.create_group(GROUP).create_array(
+        ARRAY,
+        shape=content.shape,
+        chunks=(min(content.size, _CHUNK_BYTES),),
+        dtype="uint8",
+        compressors=packing(),
     )
     array[:] = content
 
 
-def read_model(store: str | os.PathLike[str]) -> Model:
-    """The model that the run at `store` simulated; InputError if the run does not hold it."""
-    import zarr
+def read_model(path: str | os.PathLike[str]) -> Model:
+    """The model that the run at `path` simulated; InputError if the run does not hold it."""
+    from linkwise.record.checked_store import CheckedStore, open_array
 
-    shown = f"run {os.fspath(store)!r}"
-    if not (Path(store) / GROUP).is_dir():
+    folder = Path(os.path.abspath(path))
+    store = CheckedStore(folder)
+    if not (folder / GROUP).is_dir() and f"{GROUP}/zarr.json" not in (store.checksums or {}):
         raise InputError(
-            f"{shown}: does not hold its model (it is too large, or an older linkwise wrote the "
-            "run); give the model file as well"
+            f"run {str(folder)!r}: does not hold its model (it is too large, or an older linkwise "
+            "wrote the run); give the model file as well"
         )
+    name = f"{GROUP}/{ARRAY}"
+    array = open_array(store, name)
+    if array.dtype != np.uint8 or array.size > MOST_BYTES:
+        raise damage(folder, f"{name}/zarr.json", "is not that of a model")
     try:
-        array = zarr.open_group(Path(store) / GROUP, mode="r", use_consolidated=False)[ARRAY]
-        if not isinstance(array, zarr.Array) or array.dtype != np.uint8:
-            raise ValueError("its model is not made of bytes")
-        if array.size > MOST_BYTES:
-            raise ValueError("its model is too large")
-        return Model.from_bytes(np.asarray(array[:]).tobytes())
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{shown}: is damaged ({reason}); simulate again") from None
+        content = np.asarray(array[:]).tobytes()
+    except InputError:
+        raise
+    except Exception as error:
+        raise damage(folder, f"{name}/c/0", f"is damaged ({reason(error)})") from None
+    try:
+        return Model.from_bytes(content)
+    except Exception as error:
+        raise damage(folder, name, f"is damaged ({reason(error)})") from None

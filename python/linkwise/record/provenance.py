@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from linkwise._core import Model
 
 FORMAT_KEY = "linkwise_run"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+READABLE_VERSIONS = (1, 2)
+"""1: without checksums."""
 UNFINISHED = "unfinished"
 
 _RECORDED_PACKAGES = ("linkwise", "numpy", "xarray", "zarr")

@@ -20,6 +20,7 @@ import numpy as np
 
 from linkwise._core import InputError
 from linkwise.base import AnyArray
+from linkwise.record.checksums import GROUP
 from linkwise.record.claim import check_target, hold, release
 from linkwise.record.machine import write_model
 from linkwise.record.provenance import plain
@@ -38,6 +39,7 @@ CHUNK_BYTES = 4 << 20
 MAX_BLOCK_ROWS = 4096
 SCALAR_ROWS = 4096
 FLUSH_SECONDS = 2.0
+MOST_LINES = 100_000  # older ones in the list of checksums, which is then written anew
 
 
 def block_rows(schema: Schema, total: int) -> int:
@@ -77,9 +79,9 @@ class RunWriter:
         model: Model | None = None,
         flush_seconds: float = FLUSH_SECONDS,
     ) -> None:
-        import zarr
-
-        self.path = Path(path)
+        self._shown = repr(os.fspath(path))
+        # Absolute: a drive or another thread may change the folder of the process.
+        self.path = Path(os.path.abspath(path))
         check_target(self.path)
         self._schema = schema
         self._samples = samples
@@ -98,27 +100,40 @@ class RunWriter:
             ) from None
         self._lock = hold(aside)
         try:
-            self._create(aside, attrs)
-            if model is not None:
-                write_model(aside, model)
+            self._create(aside, attrs, model)
             _move_into_place(aside, self.path)
         except BaseException as error:
             release(self._lock)
             shutil.rmtree(aside, ignore_errors=True)
             if isinstance(error, OSError):
                 raise OSError(
-                    f"output {str(path)!r}: cannot be written ({error.strerror}); make room or "
+                    f"output {self._shown}: cannot be written ({error.strerror}); make room or "
                     "choose another path"
                 ) from error
             raise
-        self._group = zarr.open_group(self.path, mode="r+", zarr_format=3, use_consolidated=False)
-        names = ["time", *(variable.name for variable in schema.variables)]
-        self._arrays: dict[str, Any] = {name: self._group[name] for name in names}
+        self._open(self.path)
 
-    def _create(self, where: Path, attrs: Mapping[str, Any]) -> None:
+    def _open(self, where: Path) -> None:
         import zarr
 
-        group = zarr.open_group(where, mode="a", zarr_format=3)  # "w" would drop the locked folder
+        from linkwise.record.checked_store import WritingStore
+
+        self._store = WritingStore(where)
+        group = zarr.open_group(self._store, mode="r+", zarr_format=3, use_consolidated=False)
+        names = ["time", *(variable.name for variable in self._schema.variables)]
+        # A chunk that holds nothing but fill values is a file, too: one that is missing is damage.
+        with zarr.config.set({"array.write_empty_chunks": True}):
+            self._arrays: dict[str, Any] = {name: group[name] for name in names}
+        self._group = group
+
+    def _create(self, where: Path, attrs: Mapping[str, Any], model: Model | None) -> None:
+        import zarr
+
+        from linkwise.record.checked_store import WritingStore, packing
+
+        # Mode "w" would drop the locked folder.
+        group = zarr.open_group(WritingStore(where), mode="a", zarr_format=3)
+        group.create_group(GROUP)
         time = Variable("time", (), (), np.dtype(np.float64), TIME_ATTRS)
         for variable in (time, *self._schema.variables):
             whole_numbers = variable.dtype.kind == "i"
@@ -130,9 +145,12 @@ class RunWriter:
                 fill_value=0 if whole_numbers else np.nan,
                 dimension_names=("time", *variable.dims),
                 attributes={**variable.attrs},
+                compressors=packing(),
             )
         for name, coordinate in self._schema.coordinates.items():
             _create_text(group, name, coordinate)
+        if model is not None:
+            write_model(group, model)
         group.update_attributes({name: plain(value) for name, value in attrs.items()})
 
     def append(self, chunk: Mapping[str, Any]) -> None:
@@ -182,9 +200,10 @@ class RunWriter:
             for name, values in rows.items():
                 self._arrays[name][where] = values
             self._arrays["time"][where] = times  # last: it says that the others are complete
+            self._store.shorten_list(MOST_LINES)
         except OSError as error:
             raise OSError(
-                f"output {str(self.path)!r}: cannot be written further ({error.strerror}); make "
+                f"output {self._shown}: cannot be written further ({error.strerror}); make "
                 f"room or choose another path (the {self._written} samples there are complete)"
             ) from error
         self._written += count
@@ -199,13 +218,16 @@ class RunWriter:
         try:
             self.flush()
             self._group.update_attributes({name: plain(value) for name, value in attrs.items()})
+            self._store.shorten_list()
         finally:
             release(self._lock)
-        return open_dataset(self.path)
+        return open_dataset(self.path, finished=True)
 
 
 def _create_text(group: zarr.Group, name: str, coordinate: Coordinate) -> None:
     """Text as Zarr's `string` type: fixed-width text has no Zarr v3 specification."""
+    from linkwise.record.checked_store import packing
+
     values = coordinate.values
     array = group.create_array(
         name,
@@ -214,6 +236,7 @@ def _create_text(group: zarr.Group, name: str, coordinate: Coordinate) -> None:
         dtype="string",
         dimension_names=coordinate.dims,
         attributes={**coordinate.attrs},
+        compressors=packing(),
     )
     if values.size:
         array[:] = values.astype(object)

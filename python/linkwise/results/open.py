@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 
 from linkwise._core import InputError
-from linkwise.record.claim import is_being_written, is_run
-from linkwise.record.provenance import FORMAT_KEY, FORMAT_VERSION, UNFINISHED
+from linkwise.record.checksums import LIST
+from linkwise.record.claim import is_being_written, run_attributes
+from linkwise.record.provenance import FORMAT_KEY, READABLE_VERSIONS, UNFINISHED
 from linkwise.record.read import open_dataset
 from linkwise.results.run import Run
 
@@ -19,25 +21,36 @@ def open_run(path: str | os.PathLike[str]) -> Run:
     its process lives and "killed" afterwards, and holds the samples that were written whole.
 
     Raises:
-        InputError: there is no linkwise run at `path`.
+        InputError: there is no linkwise run at `path`, or a file that all of it needs is damaged.
+            What is damaged elsewhere is said when it is read.
+
+    A run of an older linkwise, without checksums, is read with a warning.
     """
-    where = Path(path)
+    where = Path(os.path.abspath(path))
     shown = f"run {str(path)!r}"
     if not where.exists():
         raise InputError(f"{shown}: does not exist; give a folder that linkwise wrote")
-    if not is_run(where):
+    attrs = run_attributes(where)
+    listed = (where / LIST).is_file()
+    if attrs is None:
+        if listed:
+            raise InputError(f"{shown}: zarr.json is damaged; copy the run again or simulate again")
         raise InputError(f"{shown}: is not a linkwise run; give a folder that linkwise wrote")
-    try:
-        living = is_being_written(where)
-        dataset = open_dataset(where)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{shown}: is damaged ({reason}); simulate again") from error
-    if dataset.attrs[FORMAT_KEY] != FORMAT_VERSION:
+    version = attrs[FORMAT_KEY]
+    if version not in READABLE_VERSIONS:
         raise InputError(
-            f"{shown}: has format {dataset.attrs[FORMAT_KEY]}, this linkwise reads "
-            f"{FORMAT_VERSION}; update linkwise"
+            f"{shown}: has format {str(version)[:20]}, this linkwise reads "
+            f"{' and '.join(map(str, READABLE_VERSIONS))}; update linkwise"
         )
+    if not listed:
+        why = "an older linkwise wrote it" if version == 1 else f"{LIST} is missing"
+        warnings.warn(
+            f"{shown}: has no checksums ({why}); damage to its files would not be noticed",
+            UserWarning,
+            stacklevel=2,
+        )
+    living = is_being_written(where)
+    dataset = open_dataset(where, finished=attrs.get("outcome") != UNFINISHED)
     if dataset.attrs.get("outcome") == UNFINISHED:
         dataset.attrs["outcome"] = "running" if living else "killed"
     return Run(dataset, path=where)

@@ -39,7 +39,7 @@ class Run:
         model: Model | None = None,
     ) -> None:
         self.dataset = dataset
-        self.path = None if path is None else Path(path)
+        self.path = None if path is None else Path(os.path.abspath(path))
         self._model = model
 
     def __getattr__(self, name: str) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
@@ -48,14 +48,17 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class ScenarioSource:
-    """A scenario file's path and what it says."""
+    """A scenario file's path, what it says, and the folder that the path is relative to."""
 
     path: Path
     settings: ScenarioFile
+    home: Path = field(default_factory=Path.cwd, kw_only=True)
 
     def resolve(self, path: str) -> Path:
         """A path in the file, relative to the file's own directory."""
-        return self.path.parent / path
+        near = self.path.parent / path
+        # As it was written, as long as that is the same: complaints show it.
+        return near if Path.cwd() == self.home else self.home / near
 
     def complain(self, keys: Sequence[str], problem: str, remedy: str) -> NoReturn:
         """Raise the InputError about the value at these keys."""

@@ -138,7 +138,7 @@ def variant(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
         _complain_first(scenario.path, error)
     said = ", ".join(f"{key} = {value!r}" for key, value in changes.items())
     text = f"{scenario.text.rstrip()}\n\n# changed: {' '.join(said.split())}\n"
-    return Scenario(scenario.path, settings, text)
+    return Scenario(scenario.path, settings, text, home=scenario.home)
 
 
 def _parts(key: str) -> list[str]:

@@ -5,6 +5,7 @@ import pytest
 import zarr
 
 import linkwise as lw
+from linkwise.record.checked_store import WritingStore
 from linkwise.view.source import Options, open_source
 
 
@@ -40,7 +41,7 @@ def test_chunks_that_are_cut_off(path):
 
 
 def test_loads_that_are_no_numbers(path):
-    held = zarr.open_group(path, mode="r+")["joint_load"]
+    held = zarr.open_group(WritingStore(path), mode="r+")["joint_load"]
     values = held[:]
     values[2, 1, 4] = np.nan
     held[:] = values
