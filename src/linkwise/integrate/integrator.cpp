@@ -25,9 +25,8 @@ constexpr IntegratorEntry entries[] = {
 #endif
     {"runge_kutta_4", "classical Runge-Kutta of order 4 with a fixed step; no error control", true,
      4, make_runge_kutta_4},
-    {"semi_implicit_euler",
-     "symplectic Euler of order 1 with a fixed step; no error control, energy stays bounded", true,
-     1, make_semi_implicit_euler},
+    {"semi_implicit_euler", "semi-implicit Euler of order 1 with a fixed step; no error control",
+     true, 1, make_semi_implicit_euler},
 };
 
 std::string known_names() {

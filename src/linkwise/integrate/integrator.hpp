@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <span>
 #include <string>
@@ -29,6 +30,11 @@ struct OdeSystem {
 
   /// Projects y onto its constraints: quaternions back to unit length.
   virtual void normalise(double* y) = 0;
+
+  /// Writes what the relative tolerance is taken of, per component: not negative.
+  virtual void error_scale(const double* y, double* scale) const {
+    for (int i = 0; i < size(); ++i) scale[i] = std::abs(y[i]);
+  }
 
   /// Called after each accepted step, with y normalised.
   virtual void accepted(double /*t*/, const double* /*y*/) {}

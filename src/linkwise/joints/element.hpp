@@ -3,6 +3,7 @@
 // element: its transform, its columns of the motion subspace (constant in its own frame), and
 // dq/dt.
 #include <cstdint>
+#include <string_view>
 
 #include "linkwise/joints/axis_joints.hpp"
 
@@ -36,6 +37,13 @@ inline constexpr ElementKindInfo element_kind_table[] = {
 };
 constexpr const ElementKindInfo& info_of(ElementKind kind) {
   return element_kind_table[static_cast<int>(kind)];
+}
+
+/// Of coordinate k of the kind.
+constexpr std::string_view unit_of_coordinate(ElementKind kind, int k) {
+  std::string_view units = info_of(kind).q_units;
+  for (; k > 0; --k) units.remove_prefix(units.find(' ') + 1);
+  return units.substr(0, units.find(' '));
 }
 
 /// One motion of a joint: a fixed placement after the previous frame, then the motion. Frames are

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/simulate/body_velocity_state.hpp"
@@ -16,11 +17,14 @@ namespace {
 // member that fails cannot end the others.
 constexpr double largest_acceleration = 1e100;
 
+constexpr double whole_turn = 2 * std::numbers::pi;
+
 }  // namespace
 
 Simulation::Simulation(std::shared_ptr<const Model> model, SimulationOptions options)
     : Simulation(std::make_shared<Setup>(std::move(model), std::move(options))) {}
-Simulation::Simulation(std::shared_ptr<Setup> setup) : setup_(std::move(setup)), endings_(1) {}
+Simulation::Simulation(std::shared_ptr<Setup> setup)
+    : setup_(std::move(setup)), parent_axes_(*setup_->model), endings_(1) {}
 Simulation::~Simulation() = default;
 
 void Simulation::start(double t0, const Start& start) {
@@ -49,7 +53,12 @@ void Simulation::start(double t0, const Start& start) {
     system = body_velocities_.get();
   }
   integrator_ = make_integrator(setup_->options.integrator, *system, setup_->options.integration);
-  integrator_->start(t0, body_velocities_ ? body_velocities_->start() : y_);
+  start_.assign(y_.begin(), y_.begin() + position_size());
+  if (body_velocities_) return integrator_->start(t0, body_velocities_->start());
+  std::vector<double> y = y_;
+  for (size_t i = 0; i < members_; ++i)
+    parent_axes_.from_child(y.data() + i * nq(), rates_in(y.data()) + i * nv());
+  integrator_->start(t0, y);
 }
 
 void Simulation::make_methods(double t0) {
@@ -184,15 +193,18 @@ Ending Simulation::failure(size_t member, double t, Outcome outcome, int body,
 Outcome Simulation::evaluate(double t, const double* y, double* ydot) {
   if (solver_tolerance_) solver_tolerance_->set(t);
   const bool given = setup_->any_motion(), ended = any_ended();
-  if (given || ended) {
-    imposed_.assign(y, y + size());
-    if (ended) stand_in(imposed_.data());
-    impose(t, imposed_.data());
-    y = imposed_.data();
-  }
   double* dv = rates_in(ydot);
-  position_rates(y, rates_in(y), ydot);
+  if (given || ended || !parent_axes_.trivial()) {
+    evaluated_.assign(y, y + size());
+    if (ended) stand_in(evaluated_.data());
+    to_state(evaluated_.data());
+    impose(t, evaluated_.data());
+    y = evaluated_.data();
+  }
+  calc_position_rates(y, rates_in(y), ydot);
   const Outcome outcome = accelerations(method_.get(), t, y, dv, nullptr);
+  for (size_t i = 0; i < members_; ++i)
+    parent_axes_.derivative_from_child(y + i * nq(), rates_in(y) + i * nv(), dv + i * nv());
   for (size_t i = 0; i < members_ && (given || any_ended()); ++i) {
     if (members_ > 1 && !endings_[i].ok()) {
       std::fill_n(ydot + i * nq(), nq(), 0.0);
@@ -205,6 +217,14 @@ Outcome Simulation::evaluate(double t, const double* y, double* ydot) {
 }
 
 void Simulation::position_rates(const double* q, const double* v, double* qdot) {
+  if (parent_axes_.trivial()) return calc_position_rates(q, v, qdot);
+  evaluated_.assign(q, q + position_size());
+  evaluated_.insert(evaluated_.end(), v, v + members_ * nv());
+  to_state(evaluated_.data());
+  calc_position_rates(q, rates_in(evaluated_.data()), qdot);
+}
+
+void Simulation::calc_position_rates(const double* q, const double* v, double* qdot) const {
   for (size_t i = 0; i < members_; ++i)
     for (const Element& e : model().elements)
       element_position_rate(e, q + i * nq(), v + i * nv(), qdot + i * nq());
@@ -218,6 +238,27 @@ void Simulation::accepted(double t, const double* y) {
   if (!trace_.empty()) trace_.back().accepted = true;
   if (solver_tolerance_) solver_tolerance_->accepted(t, y, rates_in(y));
   if (method_) method_->accepted(t);
+}
+
+/// The same motion is held as well many turns later or far from the origin: angles are weighed by
+/// what they are beyond whole turns, distances by the way from the start.
+void Simulation::error_scale(const double* y, double* scale) const {
+  for (int i = 0; i < size(); ++i) scale[i] = std::abs(y[i]);
+  for (size_t i = 0; i < members_; ++i)
+    for (const Element& e : model().elements)
+      for (int k = 0; k < e.nq; ++k) {
+        const size_t at = i * nq() + e.q + k;
+        const std::string_view unit = unit_of_coordinate(e.kind, k);
+        if (unit == "rad")
+          scale[at] = std::abs(y[at] - whole_turn * std::nearbyint(y[at] / whole_turn));
+        else if (unit == "m")
+          scale[at] = std::abs(y[at] - start_[at]);
+      }
+}
+
+/// Rates in parent axes become those of a state.
+void Simulation::to_state(double* y) const {
+  for (size_t i = 0; i < members_; ++i) parent_axes_.to_child(y + i * nq(), rates_in(y) + i * nv());
 }
 
 /// Writes what motion drives give at time t.
@@ -281,8 +322,10 @@ bool Simulation::advance(double t, const Sample& sample) {
   if (!reach(t)) return false;
   if (body_velocities_)
     drift_ = body_velocities_->interpolate(t);
-  else
+  else {
     integrator_->interpolate(t, y_);
+    to_state(y_.data());
+  }
   impose(t, y_.data());
   return write_sample(t, sample);
 }

@@ -8,6 +8,7 @@
 
 #include "linkwise/dynamics/batch.hpp"
 #include "linkwise/simulate/applied_forces.hpp"
+#include "linkwise/simulate/parent_axes.hpp"
 #include "linkwise/simulate/quantity.hpp"
 #include "linkwise/simulate/setup.hpp"
 #include "linkwise/simulate/solver_tolerance.hpp"
@@ -75,12 +76,15 @@ class Simulation : private OdeSystem {
   double* rates_in(double* y) const { return y + members_ * nq(); }
   const double* rates_in(const double* y) const { return y + members_ * nq(); }
 
+  // The integrator's y holds rates in parent axes (parent_axes.hpp); every other y those of a
+  // state.
   int size() const override { return static_cast<int>(members_ * (nq() + nv())); }
   int position_size() const override { return static_cast<int>(members_ * nq()); }
   Outcome evaluate(double t, const double* y, double* ydot) override;
   void position_rates(const double* q, const double* v, double* qdot) override;
   void normalise(double* y) override;
   void accepted(double t, const double* y) override;
+  void error_scale(const double* y, double* scale) const override;
 
   void make_methods(double t0);
   bool follows_error_test() const;
@@ -93,6 +97,8 @@ class Simulation : private OdeSystem {
   Outcome judge(double t, const DynamicsReport& report, const double* du, int n);
   Ending failure(size_t member, double t, Outcome outcome, int body, const double* du) const;
 
+  void to_state(double* y) const;
+  void calc_position_rates(const double* q, const double* v, double* qdot) const;
   void impose(double t, double* y);
   void stand_in(double* y) const;
   bool any_running() const;
@@ -103,6 +109,7 @@ class Simulation : private OdeSystem {
   void add_holding_torques();
 
   std::shared_ptr<Setup> setup_;
+  ParentAxes parent_axes_;
   size_t members_ = 1;
   std::optional<AppliedForces> forces_;
   /// Of one member; loads at output times are computed apart, to the fixed tolerance.
@@ -112,8 +119,9 @@ class Simulation : private OdeSystem {
   std::unique_ptr<BatchEvaluator> inverse_;            ///< made when first needed
   std::unique_ptr<Integrator> integrator_;
   std::unique_ptr<BodyVelocityState> body_velocities_;
-  /// Rows per member: state, the same with given motions, given accelerations, samples.
-  std::vector<double> y_, imposed_, given_, du_, loads_, total_;
+  /// Rows per member: state, that of an evaluation, given accelerations, samples.
+  std::vector<double> y_, evaluated_, given_, du_, loads_, total_;
+  std::vector<double> start_;  ///< positions there
   std::vector<Ending> endings_;
   Ending failure_;  ///< of the last evaluation of one member that failed in the present step
   double drift_ = 0;

@@ -1,7 +1,9 @@
-/// Symplectic (semi-implicit) Euler [hairer2006, I.1.2]:
+/// Semi-implicit Euler [hairer2006, I.1.2]:
 ///   v(t + h) = v + h vdot(t, q, v),   q(t + h) = q + h qdot(q, v(t + h)).
-/// Order 1, one evaluation per step. If the forces are conservative, the energy error stays
-/// bounded. Between steps it is linear, which is what the method assumes of q.
+/// Order 1, one evaluation per step. It is symplectic, with a bounded error of the energy, only
+/// where forces are conservative and the inertia is constant; with rates v in place of momenta it
+/// is not as soon as the inertia depends on the position. Between steps it is linear, which is what
+/// the method assumes of q.
 #include <cstddef>
 #include <vector>
 
