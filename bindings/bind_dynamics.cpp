@@ -1,4 +1,5 @@
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
 #include "bind.hpp"
@@ -43,10 +44,10 @@ void check_room(const Model& m, const States& s, bool passive, bool with_loads) 
 }
 
 nb::object forward_dynamics(const PyModel& self, const States& s, bool passive, double gravity,
-                            DynamicsOptions options, nb::handle threads, Wanted wanted) {
+                            DynamicsOptions options, std::optional<int> threads, Wanted wanted) {
   const Model& m = *self.model;
   const bool full = wanted == Wanted::full, with_loads = wanted != Wanted::accelerations;
-  options.threads = threads_of(threads, s.count * m.n_bodies());
+  options.executor = executor_for(threads, s.count * m.n_bodies());
   BatchInput in = s.input();
   in.passive_acts = passive;
   in.gravity_factor = gravity;
@@ -73,10 +74,11 @@ nb::object forward_dynamics(const PyModel& self, const States& s, bool passive, 
 }
 
 nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle a,
-                            nb::handle external, double gravity, nb::handle threads, bool loads) {
+                            nb::handle external, double gravity, std::optional<int> threads,
+                            bool loads) {
   const Model& m = *self.model;
   const States s(m, q, v, a, "acceleration", external);
-  const Executor executor(threads_of(threads, s.count * m.n_bodies()));
+  const Executor executor = executor_for(threads, s.count * m.n_bodies());
   NewArray out(s.lead, loads ? Shape{size(m.n_joints()), 6} : Shape{size(m.nv())});
   BatchInput in = s.input();
   std::swap(in.tau, in.du);
@@ -90,7 +92,7 @@ nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
 
 nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
                        nb::handle external, bool passive, const std::string& method,
-                       const std::string& solver, nb::handle threads) {
+                       const std::string& solver, std::optional<int> threads) {
   return forward_dynamics(
       self, States(*self.model, q, v, tau, "tau", external), passive, 1.0,
       options_of(method, solver, nb::none(), nb::none(), nb::none(), nb::none()), threads,
@@ -171,8 +173,8 @@ void bind_forward(nb::module_& m) {
       "forward_dynamics",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
          bool passive, const std::string& method, const std::string& solver, nb::handle tolerance,
-         nb::handle stop, nb::handle max_iterations, nb::handle solver_options, nb::handle threads,
-         bool full, double gravity, nb::handle prescribed) {
+         nb::handle stop, nb::handle max_iterations, nb::handle solver_options,
+         std::optional<int> threads, bool full, double gravity, nb::handle prescribed) {
         return forward_dynamics(
             self, States(*self.model, q, v, tau, "tau", external, prescribed), passive, gravity,
             options_of(method, solver, tolerance, stop, max_iterations, solver_options), threads,
@@ -208,7 +210,7 @@ void bind_inverse(nb::module_& m) {
   m.def(
       "inverse_dynamics",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
-         double gravity, nb::handle threads) {
+         double gravity, std::optional<int> threads) {
         return inverse_dynamics(self, q, v, a, external, gravity, threads, false);
       },
       "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
@@ -218,7 +220,7 @@ void bind_inverse(nb::module_& m) {
   m.def(
       "inverse_dynamics_loads",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
-         double gravity, nb::handle threads) {
+         double gravity, std::optional<int> threads) {
         return inverse_dynamics(self, q, v, a, external, gravity, threads, true);
       },
       "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),

@@ -1,6 +1,7 @@
 // Quantities of a state without its accelerations: poses, Jacobians, energies, momenta, mass
 // matrix.
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
 #include "bind.hpp"
@@ -14,13 +15,13 @@ namespace {
 /// f(model, q, v, out) for every state, over threads; out has `tail` numbers. v is zero where it
 /// is None.
 template <class F>
-nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handle threads,
+nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads,
                       const Shape& tail, F&& f) {
   const Model& m = *self.model;
   States s(m, q, v, nb::none(), "tau", nb::none());
   NewArray out(s.lead, tail);
   const size_t n = product(tail);
-  const Executor executor(threads_of(threads, s.count * m.n_bodies()));
+  const Executor executor = executor_for(threads, s.count * m.n_bodies());
   const std::vector<double> zero(m.nv());
   without_gil([&](const GoOn& go_on) {
     for_each_part(m, s.count, executor, go_on, [&](size_t first, size_t count) {
@@ -35,10 +36,10 @@ nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handl
 void bind_forces_and_energies(nb::module_& m) {
   m.def(
       "mass_matrix",
-      [](const PyModel& self, nb::handle q, nb::handle threads) {
+      [](const PyModel& self, nb::handle q, std::optional<int> threads) {
         const size_t nv = self.model->nv();
         const States s(*self.model, q, nb::none(), nb::none(), "tau", nb::none());
-        const Executor executor(threads_of(threads, s.count * self.model->n_bodies()));
+        const Executor executor = executor_for(threads, s.count * self.model->n_bodies());
         NewArray H(s.lead, {nv, nv});
         without_gil([&](const GoOn& go_on) {
           self.evaluator.mass_matrix(s.count, s.q.data, executor, H.data, go_on);
@@ -49,7 +50,7 @@ void bind_forces_and_energies(nb::module_& m) {
       "Joint-space mass matrix (..., nv, nv), armature included.");
   m.def(
       "passive_torque",
-      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
+      [](const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads) {
         return map_states(self, q, v, threads, {size(self.model->nv())},
                           [](const Model& m, const double* q, const double* v, double* out) {
                             std::fill(out, out + m.nv(), 0.0);
@@ -60,7 +61,7 @@ void bind_forces_and_energies(nb::module_& m) {
       "Torque (..., nv) [N m, N] of the joints' own damping, friction, springs and stops.");
   m.def(
       "kinetic_energy",
-      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
+      [](const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads) {
         return map_states(self, q, v, threads, {},
                           [](const Model& m, const double* q, const double* v, double* out) {
                             *out = kinetic_energy(m, q, v);
@@ -70,7 +71,7 @@ void bind_forces_and_energies(nb::module_& m) {
       "Kinetic energy (...) [J], rotors (armature) included.");
   m.def(
       "potential_energy",
-      [](const PyModel& self, nb::handle q, nb::handle threads) {
+      [](const PyModel& self, nb::handle q, std::optional<int> threads) {
         return map_states(self, q, nb::none(), threads, {},
                           [](const Model& m, const double* q, const double*, double* out) {
                             *out = potential_energy(m, q);
@@ -80,7 +81,7 @@ void bind_forces_and_energies(nb::module_& m) {
       "Potential energy (...) [J] of gravity (zero at the world origin), springs and stops.");
   m.def(
       "momentum",
-      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
+      [](const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads) {
         return map_states(self, q, v, threads, {6},
                           [](const Model& m, const double* q, const double* v, double* out) {
                             momentum(m, q, v, out);
@@ -113,7 +114,7 @@ int joint_of(const PyModel& self, nb::handle body) {
 void bind_poses(nb::module_& m) {
   m.def(
       "joint_poses",
-      [](const PyModel& self, nb::handle q, nb::handle threads) {
+      [](const PyModel& self, nb::handle q, std::optional<int> threads) {
         return map_states(self, q, nb::none(), threads, {size(self.model->n_joints()), 4, 4},
                           [](const Model& m, const double* q, const double*, double* out) {
                             joint_poses(m, q, out);
@@ -125,7 +126,7 @@ void bind_poses(nb::module_& m) {
       "matrices that take points of that frame to the world, m.");
   m.def(
       "link_poses",
-      [](const PyModel& self, nb::handle q, nb::handle threads) {
+      [](const PyModel& self, nb::handle q, std::optional<int> threads) {
         return map_states(self, q, nb::none(), threads, {self.model->links.size(), 4, 4},
                           [](const Model& m, const double* q, const double*, double* out) {
                             link_poses(m, q, out);
@@ -135,7 +136,7 @@ void bind_poses(nb::module_& m) {
       "Poses (..., links, 4, 4) of all links of the source, merged ones too, in the world.");
   m.def(
       "body_jacobian",
-      [](const PyModel& self, nb::handle q, nb::handle body, nb::handle threads) {
+      [](const PyModel& self, nb::handle q, nb::handle body, std::optional<int> threads) {
         const int joint = joint_of(self, body);
         return map_states(self, q, nb::none(), threads, {6, size(self.model->nv())},
                           [joint](const Model& m, const double* q, const double*, double* out) {

@@ -4,7 +4,6 @@
 
 #include "bind.hpp"
 #include "interrupt.hpp"
-#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/simulate/numerics.hpp"
 #include "py_simulation.hpp"
 #include "samples.hpp"
@@ -59,13 +58,14 @@ nb::dict trace_columns(const std::vector<EvaluationTrace>& trace) {
 /// Options by the names of the table, and solver_options and threads.
 SimulationOptions options_of(const nb::kwargs& given) {
   Numerics numerics;
-  nb::object solver_options = nb::none(), threads = nb::none();
+  nb::object solver_options = nb::none();
+  std::optional<int> threads;
   for (auto [key, value] : given) {
     const std::string name = nb::cast<std::string>(key);
     if (name == "solver_options") {
       solver_options = nb::borrow(value);
     } else if (name == "threads") {
-      threads = nb::borrow(value);
+      threads = nb::cast<std::optional<int>>(value);
     } else {
       std::visit(
           [&, value = value](auto member) {
@@ -78,7 +78,7 @@ SimulationOptions options_of(const nb::kwargs& given) {
           find_numerics(name).member);
     }
   }
-  SimulationOptions options = simulation_options(numerics, threads_of(threads, 1 << 20));
+  SimulationOptions options = simulation_options(numerics, executor_for(threads));
   read_solver_options(solver_options, options.dynamics);
   options.follow_error_test &= !gives_tolerance(solver_options);
   return options;

@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
 #include "arrays.hpp"
@@ -419,9 +420,9 @@ void bind_evaluator(nb::module_& m) {
           [](PyEvaluator* self, const PyModel& model, const std::string& method,
              const std::string& solver, const std::string& guess, double tolerance,
              const std::string& stop, int max_iterations, nb::handle solver_options,
-             nb::handle threads) {
+             std::optional<int> threads) {
             DynamicsOptions options;
-            options.threads = threads_of(threads, 1 << 20);
+            options.executor = executor_for(threads);
             options.method = method;
             options.solver = solver;
             options.initial_guess = guess;

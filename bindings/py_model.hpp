@@ -4,21 +4,10 @@
 
 #include <nanobind/nanobind.h>
 
-#include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/evaluator.hpp"
-#include "linkwise/exec/thread_pool.hpp"
+#include "linkwise/exec/executor.hpp"
 
 namespace linkwise::bindings {
-
-/// The argument `threads`; None stands for the default. The default is not looked up if the work
-/// (in bodies) would not pay for a second thread.
-inline int threads_of(nanobind::handle asked, size_t work) {
-  if (asked.is_none()) return work < 512 ? 1 : default_threads();
-  const int threads = nanobind::cast<int>(asked);
-  if (threads == 0)
-    throw InputError("threads is 0; give a whole number of at least 1, or None for all cores");
-  return checked_threads(threads);
-}
 
 struct PyModel {
   explicit PyModel(ModelSpec spec)

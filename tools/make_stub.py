@@ -44,7 +44,6 @@ PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "solver_options": "Mapping[str, Any]",
     "source": "str",
     "stop": "str",
-    "threads": "int",
     "tolerance": "float",
     "properties": "Any",
 }

@@ -8,7 +8,6 @@
 // their paths in SIMD lanes. Nanoseconds per body, joint loads included, one thread, best of many.
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <random>
@@ -18,6 +17,7 @@
 #include "linkwise/dynamics/articulated_body.hpp"
 #include "linkwise/dynamics/articulated_paths.hpp"
 #include "linkwise/dynamics/piecewise.hpp"
+#include "timing.hpp"
 
 using namespace linkwise;
 
@@ -73,18 +73,15 @@ double nanoseconds(const Model& model, Evaluate&& evaluate) {
   const int calls = std::max(4, 20'000 / model.n_bodies());
   double best = 1e300;
   for (int turn = 0; turn < repeats; ++turn) {
-    const auto start = std::chrono::steady_clock::now();
-    for (int i = 0; i < calls; ++i) {
+    const Taken taken = timed(calls, [&](long i) {
       const size_t k = i % n_states;
       SweepInput<double> in;
       in.q = &q[k * nq];
       in.v = &v[k * nv];
       in.tau = &tau[k * nv];
       evaluate(in, du.data(), loads.data());
-    }
-    const std::chrono::duration<double, std::nano> passed =
-        std::chrono::steady_clock::now() - start;
-    best = std::min(best, passed.count() / calls / model.n_bodies());
+    });
+    best = std::min(best, 1e9 * taken.seconds / calls / model.n_bodies());
   }
   return best;
 }
@@ -113,7 +110,6 @@ std::vector<int> grown(int n, int reach) {
 void print_chain(int n) {
   const Model model = machine(legs(1, n), false);
   DynamicsOptions options;
-  options.threads = 1;
   Piecewise pieces(model, options);
   const double in_pieces = nanoseconds(
       model, [&](const auto& in, double* du, double* loads) { pieces.evaluate(0, in, du, loads); });

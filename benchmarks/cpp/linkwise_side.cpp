@@ -100,16 +100,14 @@ Field make_linkwise(const std::filesystem::path& folder) {
       return;  // a method for other machines than this one
     }
     field.contestants.push_back(single(shared, name, options));
-    field.contestants.back().threads = options.threads;
+    field.contestants.back().threads = options.executor.threads();
   };
-  DynamicsOptions plain;
-  plain.threads = 1;
+  const DynamicsOptions plain;
   enter("auto", plain);
   field.contestants.push_back(single(shared, "auto, no loads", plain, false));
   for (const DynamicsEntry& method : dynamics_table()) {
     if (!method.linear_time && n > largest_for_mass_matrix) continue;
     DynamicsOptions options;
-    options.threads = 1;
     options.method = method.name;
     options.solver_options.tolerance = iterative_tolerance;
     if (!method.uses_solver) {
@@ -126,7 +124,7 @@ Field make_linkwise(const std::filesystem::path& folder) {
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   for (int threads = 1; threads <= cores; threads *= 2) {
     DynamicsOptions options;
-    options.threads = threads;
+    options.executor = Executor(threads);
     enter(std::to_string(threads) + (threads > 1 ? " threads" : " thread"), options);
   }
   return field;

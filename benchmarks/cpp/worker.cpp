@@ -6,9 +6,7 @@
 //     time METHOD CALLS  -> {"seconds": ..., "cpu": ...}: of the wall clock, of the threads
 //     together memory             -> {"resident": bytes, "peak": bytes}
 // FOLDER, METHOD and FILE are lines of their own. A failure is {"error": "..."}.
-#include <chrono>
 #include <cstdio>
-#include <ctime>
 #include <fstream>
 #include <iostream>
 #include <stdexcept>
@@ -16,6 +14,7 @@
 #include <sys/resource.h>
 
 #include "contestant.hpp"
+#include "timing.hpp"
 
 namespace {
 
@@ -79,13 +78,10 @@ std::string check(const Field& field) {
 std::string time(const Field& field) {
   const Contestant& contestant = find(field, line());
   const long calls = std::stol(line());
-  const auto start = std::chrono::steady_clock::now();
-  const std::clock_t busy = std::clock();
-  for (long i = 0; i < calls; ++i) contestant.evaluate(static_cast<int>(i % field.states));
-  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-  const double cpu = static_cast<double>(std::clock() - busy) / CLOCKS_PER_SEC;
+  const Taken taken =
+      timed(calls, [&](long i) { contestant.evaluate(static_cast<int>(i % field.states)); });
   char text[96];
-  std::snprintf(text, sizeof text, "{\"seconds\": %.9g, \"cpu\": %.9g}", taken.count(), cpu);
+  std::snprintf(text, sizeof text, "{\"seconds\": %.9g, \"cpu\": %.9g}", taken.seconds, taken.cpu);
   return text;
 }
 

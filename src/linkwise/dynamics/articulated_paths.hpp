@@ -60,8 +60,6 @@ class ArticulatedPaths {
 
  private:
   using Group = PathGroup<S>;
-  /// As many positions as make a barrier between threads worth its time.
-  static constexpr int fewest_for_threads = 128;
 
   void add_group(int begin, std::vector<PathPlace>& place) {
     const int g = static_cast<int>(groups_.size());
@@ -114,15 +112,14 @@ class ArticulatedPaths {
     for (const auto& groups : rounds_) {
       int positions = 0;
       for (const int g : groups) positions += groups_[g].length();
-      shared_.push_back(groups.size() > 1 && positions >= fewest_for_threads);
+      executor_of_round_.push_back(executor_.where_it_pays(Worth::region, positions));
     }
   }
 
   template <class F>
   void in_round(size_t r, F&& f) {
-    const Executor executor = shared_[r] ? executor_ : Executor();
-    executor.for_each(static_cast<int>(rounds_[r].size()),
-                      [&](int i) { f(groups_[rounds_[r][i]]); });
+    executor_of_round_[r].for_each(static_cast<int>(rounds_[r].size()),
+                                   [&](int i) { f(groups_[rounds_[r][i]]); });
   }
   template <class F>
   void base_to_tip(F&& f) {
@@ -214,7 +211,7 @@ class ArticulatedPaths {
   TreeSweeps<double> others_;  ///< trunk and outer bodies; external wrenches and loads of all
   std::vector<Group> groups_;
   std::vector<std::vector<int>> rounds_;
-  std::vector<char> shared_;  ///< round: among threads
+  std::vector<Executor> executor_of_round_;
   /// Roots of paths that hang on bodies of the trunk.
   struct OnTrunk {
     int parent;

@@ -1,6 +1,5 @@
 #include "linkwise/dynamics/constraint_force.hpp"
 
-#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
@@ -9,14 +8,14 @@ namespace {
 
 SolverOptions solver_options(const DynamicsOptions& options) {
   SolverOptions own = options.solver_options;
-  own.executor = Executor(checked_threads(options.threads));
+  own.executor = options.executor;
   return own;
 }
 
 }  // namespace
 
 ConstraintForce::ConstraintForce(const Model& model, const DynamicsOptions& options)
-    : system_(model, Executor(checked_threads(options.threads))),
+    : system_(model, options.executor),
       solver_(make_solver(options.solver, solver_options(options))),
       guess_(make_initial_guess(options.initial_guess, options.solver_options.own)),
       f_(system_.A().size()),

@@ -8,7 +8,6 @@
 #include "linkwise/constraint/joint_constraint.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/parts.hpp"
-#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/forces/passive.hpp"
 #include "linkwise/solve/direct/direct_solver.hpp"
 
@@ -257,8 +256,7 @@ EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& sta
         n, s.from(m, first), out.acceleration + first * m.nv(),
         out.joint_load ? out.joint_load + first * 6 * m.n_joints() : nullptr, picked.on_lanes));
   };
-  const Executor executor(checked_threads(options.threads));
-  for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
+  for_each_part(m, count, options.executor, go_on, [&](size_t first, size_t n) {
     if (n == count) return part(workspace->batch, first, n);
     Lease own(*this);
     part(own->batch, first, n);

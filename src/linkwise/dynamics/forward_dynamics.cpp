@@ -9,7 +9,6 @@
 #include "linkwise/dynamics/global_projection.hpp"
 #include "linkwise/dynamics/joint_space_conjugate_gradient.hpp"
 #include "linkwise/dynamics/piecewise.hpp"
-#include "linkwise/exec/thread_pool.hpp"
 #include "linkwise/solve/direct/direct_solver.hpp"
 #include "linkwise/solve/registry.hpp"
 
@@ -73,11 +72,11 @@ class FusedConstraintForce : public DynamicsMethod {
 
 std::unique_ptr<DynamicsMethod> make_articulated_body(const Model& model,
                                                       const DynamicsOptions& options) {
-  const Executor executor(checked_threads(options.threads));
   if (paths_fill(model, native_lanes))
-    return std::make_unique<Recursion<ArticulatedPaths<Lanes<native_lanes>>>>(model, executor);
+    return std::make_unique<Recursion<ArticulatedPaths<Lanes<native_lanes>>>>(model,
+                                                                              options.executor);
   auto method = std::make_unique<Recursion<ArticulatedBody<double>>>(model);
-  method->kernel().share_branches(executor);
+  method->kernel().share_branches(options.executor);
   return method;
 }
 

@@ -16,7 +16,7 @@ struct DynamicsOptions {
   std::string method = "auto";
   std::string solver = "auto";  ///< for method constraint_force
   std::string initial_guess = "zero";
-  int threads = 0;  ///< 0: the default of thread_pool.hpp
+  Executor executor;  ///< who shares the work; it influences no result
   SolverOptions solver_options;
 
   bool operator==(const DynamicsOptions&) const = default;

@@ -17,12 +17,11 @@ using GoOn = std::function<bool()>;
 template <class F>
 void for_each_part(const Model& model, size_t count, const Executor& executor, const GoOn& go_on,
                    F&& f) {
-  constexpr size_t worth_a_thread = 512;  // bodies: some 20 us of work
-  constexpr size_t most = 1 << 18;        // bodies between two calls of go_on: some 10 ms
+  constexpr size_t most = 1 << 18;  // bodies between two calls of go_on: some 10 ms
   const size_t groups = (count + native_lanes - 1) / native_lanes;
   const size_t work = count * model.n_bodies();
-  const size_t shares =
-      std::min(static_cast<size_t>(executor.threads()), work / worth_a_thread + 1);
+  const size_t shares = std::min(static_cast<size_t>(executor.threads()),
+                                 work / static_cast<size_t>(Worth::call) + 1);
   const size_t parts = std::min(groups, std::max(shares, work / most));
   if (parts <= 1) return f(size_t{0}, count);
   executor.for_each(static_cast<int>(parts), [&](int i) {

@@ -11,20 +11,13 @@ namespace {
 
 using Group = Lanes<native_lanes>;
 
-/// On shorter chains three barriers of a microsecond cost more than a second thread saves.
-constexpr int fewest_for_threads = 128;
-
-Executor executor_for(int n_bodies, int threads) {
-  return n_bodies < fewest_for_threads ? Executor() : Executor(checked_threads(threads));
-}
-
 }  // namespace
 
 class PiecewiseChain {
  public:
   PiecewiseChain(const Model& model, const DynamicsOptions& options)
       : model_(model),
-        executor_(executor_for(model.n_bodies(), options.threads)),
+        executor_(options.executor.where_it_pays(Worth::region, model.n_bodies())),
         n_(model.n_bodies()),
         n_pieces_(Piecewise::pieces(n_)),
         length_((n_ + n_pieces_ - 1) / n_pieces_),

@@ -138,14 +138,6 @@ int default_threads() {
   return static_cast<int>(n);
 }
 
-int checked_threads(int asked) {
-  if (asked == 0) return default_threads();
-  if (asked < 1 || asked > max_threads)
-    throw InputError("threads is " + std::to_string(asked) + "; give a whole number from 1 to " +
-                     std::to_string(max_threads));
-  return asked;
-}
-
 void parallel_for(int n, int threads, const std::function<void(int)>& task) {
   Pool::instance().run(n, threads, task);
 }

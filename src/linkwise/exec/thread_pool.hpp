@@ -9,8 +9,6 @@ namespace linkwise {
 /// InputError if the variable is not a number in range.
 int default_threads();
 
-/// 0 stands for the default. InputError below 1 or above the limit.
-int checked_threads(int asked);
 inline constexpr int max_threads = 1024;
 
 /// Runs task(0) ... task(n - 1) on up to `threads` threads, this one included, and returns when all

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/exec/thread_pool.hpp"
 
 namespace linkwise {
 namespace {
@@ -54,9 +53,9 @@ const NumericsEntry& find_numerics(std::string_view name) {
   throw InputError("unknown option '" + std::string(name) + "'; known: " + known);
 }
 
-SimulationOptions simulation_options(const Numerics& n, int threads) {
+SimulationOptions simulation_options(const Numerics& n, const Executor& executor) {
   SimulationOptions o;
-  o.dynamics.threads = checked_threads(threads);
+  o.dynamics.executor = executor;
   if (!positive(n.tolerance))
     throw InputError("tolerance must be a positive number; 1e-6 is usual");
   const double allowed_per_step = n.step_tolerance.value_or(step_share * n.tolerance);

@@ -38,6 +38,6 @@ std::span<const NumericsEntry> numerics_table();
 const NumericsEntry& find_numerics(std::string_view name);
 
 /// What follows for a simulation. InputError where a number is out of range or a name unknown.
-SimulationOptions simulation_options(const Numerics& numerics, int threads);
+SimulationOptions simulation_options(const Numerics& numerics, const Executor& executor);
 
 }  // namespace linkwise

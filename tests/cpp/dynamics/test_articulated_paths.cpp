@@ -181,9 +181,7 @@ TEST(Paths, TheMethodOfATreeIsTheOneOnPaths) {
   const DynamicsCase c(model, 5);
   ArticulatedPaths<Lanes<native_lanes>> paths(model);
   const Motion6 want = run(paths, model, c.input());
-  DynamicsOptions options;
-  options.threads = 1;
-  const Motion6 got = evaluate(*make_dynamics(model, options), model, c.input());
+  const Motion6 got = evaluate(*make_dynamics(model, {}), model, c.input());
   EXPECT_EQ(got.du, want.du);
   EXPECT_EQ(got.loads, want.loads);
 }

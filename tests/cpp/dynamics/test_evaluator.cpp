@@ -17,7 +17,6 @@ DynamicsOptions asking_for(const std::string& method, const std::string& solver 
   DynamicsOptions options = evaluation_options();
   options.method = method;
   options.solver = solver;
-  options.threads = 1;
   return options;
 }
 
@@ -94,7 +93,7 @@ TEST(Evaluator, ThreadsChangeNoBit) {
   const Model m = arm(40);
   DynamicsOptions options = asking_for("auto");
   const Evaluated one(m, 100, options);
-  options.threads = 3;
+  options.executor = Executor(3);
   const Evaluated three(m, 100, options);
   EXPECT_EQ(one.du, three.du);
   EXPECT_EQ(one.loads, three.loads);
@@ -143,15 +142,6 @@ TEST(Evaluator, OptionsThatChangeNothingKeepTheLanes) {
   EXPECT_EQ(Evaluated(m, count, given).du, states.du);
   given.solver_options.set("refinement_steps", 1);
   EXPECT_EQ(times_asked(given), static_cast<int>(count));
-}
-
-// No thread is asked for below one; zero stands for the default.
-TEST(Evaluator, ThreadsAreChecked) {
-  DynamicsOptions options = asking_for("auto");
-  options.threads = 0;
-  EXPECT_TRUE(Evaluated(arm(), 2, options).report.ok());
-  options.threads = -1;
-  EXPECT_THROW(Evaluated(arm(), 2, options), InputError);
 }
 
 TEST(Evaluator, PassiveForcesActWhereAskedFor) {

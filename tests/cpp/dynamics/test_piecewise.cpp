@@ -69,7 +69,7 @@ struct State {
 
 Result run(const Model& model, const State& state, int threads) {
   DynamicsOptions options;
-  options.threads = threads;
+  options.executor = Executor(threads);
   Piecewise method(model, options);
   Result out{std::vector<double>(model.nv()), std::vector<double>(6 * model.n_joints())};
   const DynamicsReport report = method.evaluate(0, state.input(), out.du.data(), out.loads.data());

@@ -49,17 +49,9 @@ TEST(ThreadsPool, ExceptionsReachTheCallerAndThePoolGoesOn) {
   EXPECT_EQ(count, 8);
 }
 
-TEST(ThreadsPool, NumberOfThreadsIsChecked) {
-  EXPECT_EQ(checked_threads(3), 3);
-  EXPECT_THROW(checked_threads(-1), InputError);
-  EXPECT_THROW(checked_threads(max_threads + 1), InputError);
-  EXPECT_GE(default_threads(), 1);
-}
-
 TEST(ThreadsPool, EnvironmentGivesTheDefault) {
   setenv("LINKWISE_THREADS", "5", 1);
   EXPECT_EQ(default_threads(), 5);
-  EXPECT_EQ(checked_threads(0), 5);
   for (const char* bad : {"0", "-2", "two", "3x", "99999"}) {
     setenv("LINKWISE_THREADS", bad, 1);
     EXPECT_THROW(default_threads(), InputError) << bad;

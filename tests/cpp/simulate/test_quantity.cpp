@@ -47,14 +47,16 @@ TEST(Quantities, AreAsWideAsTheySay) {
 TEST(Numerics, ShareOfTheToleranceGoesToAStepAndToTheForces) {
   Numerics numerics;
   numerics.tolerance = 1e-4;
-  EXPECT_DOUBLE_EQ(simulation_options(numerics, 1).integration.tolerance, 1e-5);
-  EXPECT_DOUBLE_EQ(simulation_options(numerics, 1).dynamics.solver_options.tolerance, 1e-6);
-  EXPECT_TRUE(simulation_options(numerics, 1).follow_error_test);
+  EXPECT_DOUBLE_EQ(simulation_options(numerics, Executor()).integration.tolerance, 1e-5);
+  EXPECT_DOUBLE_EQ(simulation_options(numerics, Executor()).dynamics.solver_options.tolerance,
+                   1e-6);
+  EXPECT_TRUE(simulation_options(numerics, Executor()).follow_error_test);
   numerics.step_tolerance = 1e-3;
   numerics.solver_tolerance = 1e-9;
-  EXPECT_DOUBLE_EQ(simulation_options(numerics, 1).integration.tolerance, 1e-3);
-  EXPECT_DOUBLE_EQ(simulation_options(numerics, 1).dynamics.solver_options.tolerance, 1e-9);
-  EXPECT_FALSE(simulation_options(numerics, 1).follow_error_test);
+  EXPECT_DOUBLE_EQ(simulation_options(numerics, Executor()).integration.tolerance, 1e-3);
+  EXPECT_DOUBLE_EQ(simulation_options(numerics, Executor()).dynamics.solver_options.tolerance,
+                   1e-9);
+  EXPECT_FALSE(simulation_options(numerics, Executor()).follow_error_test);
 }
 
 TEST(Numerics, RefusesWhatItDoesNotKnow) {
@@ -62,10 +64,10 @@ TEST(Numerics, RefusesWhatItDoesNotKnow) {
   for (const NumericsEntry& entry : numerics_table()) EXPECT_EQ(&find_numerics(entry.name), &entry);
   Numerics numerics;
   numerics.tolerance = -1;
-  EXPECT_THROW(simulation_options(numerics, 1), InputError);
+  EXPECT_THROW(simulation_options(numerics, Executor()), InputError);
   numerics = {};
   numerics.integrator = "magic";
-  EXPECT_THROW(simulation_options(numerics, 1), InputError);
+  EXPECT_THROW(simulation_options(numerics, Executor()), InputError);
 }
 
 }  // namespace
