@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
 from typing import Any
 
 import numpy as np
 
 import linkwise as lw
 from benchmarks import study
+from benchmarks.timing import timed
 
 G = 9.81
 CASES: dict[int, dict[str, Any]] = {
@@ -32,15 +32,11 @@ EMPTY = study.peak_bytes()
 
 def simulate(n: int) -> dict[str, Any]:
     options = CASES[n]
-    started = time.perf_counter()
-    model = lw.scenes.chain(n, gravity=(0, 0, -G))
-    built = time.perf_counter() - started
+    model, built = timed(lambda: lw.scenes.chain(n, gravity=(0, 0, -G)))
     q0 = np.zeros(model.nq)
     q0[0] = np.pi / 2
     kept = ["position", "joint_load", "energy", "statistics"]
-    started, processor = time.perf_counter(), time.process_time()
-    run = lw.simulate(model, q0=q0, quantities=kept, **options)
-    seconds, processor = time.perf_counter() - started, time.process_time() - processor
+    run, taken = timed(lambda: lw.simulate(model, q0=q0, quantities=kept, **options))
     end = float(run.time[-1])
     # Against the start: a million turned frames in a row round the height by some 1e-5 m.
     tips = lw.link_poses(model, run.position.values[[0, -1]])[:, -1] @ [0, 0, -1.0, 1]
@@ -53,10 +49,10 @@ def simulate(n: int) -> dict[str, Any]:
         "integrator": options.get("integrator", "adams"),
         "steps": int(run.steps[-1]),
         "evaluations": evaluations,
-        "build_seconds": built,
-        "seconds": seconds,
-        "processor_seconds": processor,
-        "ns_per_body": processor / evaluations / n * 1e9,
+        "build_seconds": built.seconds,
+        "seconds": taken.seconds,
+        "processor_seconds": taken.cpu,
+        "ns_per_body": taken.cpu / evaluations / n * 1e9,
         "peak_bytes_per_link": (peak - EMPTY) / n,
         "peak_bytes": peak,
         "tip_fell": tips[0, 2] - tips[1, 2],

@@ -13,7 +13,7 @@ rs_conjugate_gradient at most 0.55 times the iterations of conjugate_gradient, u
 
 from __future__ import annotations
 
-import time
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 import linkwise as lw
 from benchmarks import study
+from benchmarks.timing import timed
 
 TOLERANCE = 1e-10
 SOLVERS = (
@@ -75,13 +76,13 @@ def measure(kind: str, pose: str, n: int, seed: int) -> dict[str, Any]:
         "solvers": {},
     }
     for solver in SOLVERS:
-        started = time.perf_counter()
-        f, report = made.solve(solver, tolerance=TOLERANCE, max_iterations=most)
+        solve = partial(made.solve, solver, tolerance=TOLERANCE, max_iterations=most)
+        (f, report), taken = timed(solve)
         row["solvers"][solver] = {
             "iterations": report.iterations,
             "outcome": report.outcome,
             "error": made.energy_norm(f - exact) / scale,
-            "seconds": time.perf_counter() - started,
+            "seconds": taken.seconds,
         }
     return row
 

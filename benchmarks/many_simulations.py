@@ -23,6 +23,7 @@ import numpy as np
 import linkwise as lw
 from benchmarks import study
 from benchmarks.machine import Array, random_chain, random_states, read_bodies, write_machine
+from benchmarks.timing import least_cpu
 
 STEP, STEPS, JOINTS = 1e-3, 1000, 7
 EVALUATIONS = 4  # per step
@@ -104,26 +105,26 @@ def measure(members: int) -> list[dict[str, Any]]:
         error = float(np.abs(ends - expected[:count]).max())
         if error > 1e-6:
             raise SystemExit(f"{name} ends {error:.1e} rad away from simulate_batch")
-        each = study.least_processor_time(partial(run, count)) / count
+        each = least_cpu(partial(run, count)) / count
         rows.append(
             {
                 "what": name,
                 "members": count,
-                "ms_a_member": 1e3 * each,
-                "ns_a_body_and_evaluation": 1e9 * each / (STEPS * EVALUATIONS * JOINTS),
+                "ms_per_member": 1e3 * each,
+                "ns_per_body_and_evaluation": 1e9 * each / (STEPS * EVALUATIONS * JOINTS),
                 "times_real_time": STEP * STEPS / each,
                 "deviation": error,
             }
         )
     for row in rows:
-        row["ratio"] = row["ms_a_member"] / rows[0]["ms_a_member"]
+        row["ratio"] = row["ms_per_member"] / rows[0]["ms_per_member"]
     return rows
 
 
 COLUMNS: study.Columns = {
     "one core": lambda r: r["what"],
-    "ms per member": lambda r: f"{r['ms_a_member']:.3g}",
-    "ns per body and evaluation": lambda r: f"{r['ns_a_body_and_evaluation']:.3g}",
+    "ms per member": lambda r: f"{r['ms_per_member']:.3g}",
+    "ns per body and evaluation": lambda r: f"{r['ns_per_body_and_evaluation']:.3g}",
     "times real time": lambda r: f"{r['times_real_time']:,.0f}",
     "ratio": lambda r: f"{r['ratio']:.2g}",
 }

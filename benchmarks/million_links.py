@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
 from typing import Any
 
 import numpy as np
 
 import linkwise as lw
 from benchmarks import study
+from benchmarks.timing import timed
 
 METHODS: dict[str, dict[str, Any]] = {
     "auto": {},
@@ -30,20 +30,19 @@ AGREEMENT = 1e-9
 
 
 def evaluate(name: str, n: int) -> dict[str, Any]:
-    empty, started = study.peak_bytes(), time.perf_counter()
-    model = lw.scenes.chain(n, gravity=(0, 0, 0))
-    built, with_model = time.perf_counter() - started, study.peak_bytes()
+    empty = study.peak_bytes()
+    model, built = timed(lambda: lw.scenes.chain(n, gravity=(0, 0, 0)))
+    with_model = study.peak_bytes()
     rng = np.random.default_rng(SEED)
     q, tau = BEND * rng.standard_normal(model.nq), rng.standard_normal(model.nv)
-    started = time.perf_counter()
-    found = lw.forward_dynamics(model, q, np.zeros(model.nv), tau, full=True, **METHODS[name])
-    seconds = time.perf_counter() - started
+    state = q, np.zeros(model.nv), tau
+    found, taken = timed(lambda: lw.forward_dynamics(model, *state, full=True, **METHODS[name]))
     if found.report.outcome != "converged":
         raise SystemExit(f"{name}: {found.report.outcome}")
     return {
         "method": name,
-        "build_seconds": built,
-        "seconds": seconds,
+        "build_seconds": built.seconds,
+        "seconds": taken.seconds,
         "model_bytes": (with_model - empty) / n,
         "bytes": (study.peak_bytes() - empty) / n,
         "accelerations": found.acceleration[:: max(1, n // 1000)].tolist(),

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from benchmarks.process import (
     memory_limit,
     python_worker,
 )
+from benchmarks.timing import timed
 
 CPP, PYTHON = "C++", "Python"
 
@@ -116,9 +117,9 @@ class Session:
         self._before = int(worker.ask("memory", timeout=5)["resident"])
         # Half of what is free now: those built before keep theirs, and all together never take all.
         worker.allow(memory_limit())
-        start = time.perf_counter()
-        answer = worker.ask("build", str(self.folder), timeout=self.workers.effort.build)
-        self.build_seconds = time.perf_counter() - start
+        build = partial(worker.ask, "build", str(self.folder), timeout=self.workers.effort.build)
+        answer, taken = timed(build)
+        self.build_seconds = taken.seconds
         self._built = worker
         return answer
 

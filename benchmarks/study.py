@@ -7,7 +7,6 @@ import json
 import resource
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -39,16 +38,6 @@ def in_own_process(study: str, *arguments: object) -> Any:
 def peak_bytes() -> int:
     """The most that this process has held."""
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-
-
-def least_processor_time(call: Callable[[], object], turns: int = 5) -> float:
-    """Seconds of all threads together, of the best turn: a busy machine hardly matters."""
-    spent = []
-    for _ in range(turns):
-        started = time.process_time()
-        call()
-        spent.append(time.process_time() - started)
-    return min(spent)
 
 
 def table(rows: Sequence[Any], columns: Columns, *, left: int = 1) -> str:

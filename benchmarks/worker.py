@@ -12,7 +12,6 @@ import gc
 import json
 import os
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -22,6 +21,7 @@ import numpy as np
 
 from benchmarks.engines.base import Contestant, Field
 from benchmarks.engines.table import BY_NAME
+from benchmarks.timing import timed
 
 
 class Worker:
@@ -71,10 +71,12 @@ class Worker:
         contestant, calls = self.contestant(), int(self.line())
         rows, evaluate = self.loaded().states.rows(), contestant.evaluate
         count = len(rows)
-        start, busy = time.perf_counter(), time.process_time()
-        for k in range(calls):
-            evaluate(*rows[k % count])
-        return {"seconds": time.perf_counter() - start, "cpu": time.process_time() - busy}
+
+        def run() -> None:
+            for k in range(calls):
+                evaluate(*rows[k % count])
+
+        return asdict(timed(run)[1])
 
     def simulate(self) -> dict[str, Any]:
         method, duration, setting, file = (self.line() for _ in range(4))

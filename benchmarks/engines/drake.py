@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 from benchmarks import coordinates
 from benchmarks.engines.base import Contestant, Field, Motion, Offer, Simulator
 from benchmarks.machine import Array, States, read_bodies
+from benchmarks.timing import timed
 
 
 def build(folder: Path) -> Field:
@@ -89,11 +89,13 @@ def _simulator(plant: Any, states: States, method: str) -> Simulator:
         plant.SetPositionsAndVelocities(context, np.concatenate([states.q[0], states.v[0]]))
         tau = np.zeros(states.v.shape[1])
         plant.get_applied_generalized_force_input_port().FixValue(context, tau)
-        start = time.process_time()
-        simulator.Initialize()
-        simulator.AdvanceTo(duration)
-        seconds = time.process_time() - start
+
+        def run() -> None:
+            simulator.Initialize()
+            simulator.AdvanceTo(duration)
+
+        _, taken = timed(run)
         q = np.array(plant.GetPositions(context))
-        return Motion(q, seconds, int(integrator.get_num_derivative_evaluations()))
+        return Motion(q, taken.cpu, int(integrator.get_num_derivative_evaluations()))
 
     return Simulator(method.replace("_", " "), False, simulate)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 import linkwise as lw
 from benchmarks.engines.base import Contestant, Field, Motion, Offer, Simulator
 from benchmarks.machine import Array, States, read_model
+from benchmarks.timing import timed
 from linkwise import _core
 from linkwise._core import Model
 
@@ -93,12 +93,14 @@ def _simulator(model: Model, states: States, entry: dict[str, Any]) -> Simulator
         accuracy: dict[str, Any] = {"step" if fixed else "step_tolerance": setting}
         # The loop alone, as of the peers: lw.simulate labels and records the results as well.
         loop = _core.Simulation(model, integrator=name, **accuracy)
-        start = time.process_time()
-        loop.start(0.0, states.q[0], states.v[0])
-        found = loop.advance(np.array([duration]), {"position"})
-        seconds = time.process_time() - start
+
+        def run() -> dict[str, Array]:
+            loop.start(0.0, states.q[0], states.v[0])
+            return loop.advance(np.array([duration]), {"position"})
+
+        found, taken = timed(run)
         if loop.ending.outcome != "converged":
             raise RuntimeError(f"{loop.ending.outcome} at {loop.ending.time:g} s")
-        return Motion(np.array(found["position"][-1]), seconds, loop.statistics.evaluations)
+        return Motion(np.array(found["position"][-1]), taken.cpu, loop.statistics.evaluations)
 
     return Simulator(name, fixed, simulate)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 from benchmarks import coordinates
 from benchmarks.engines.base import Contestant, Field, Motion, Offer, Simulator
 from benchmarks.machine import Array, States, read_bodies
+from benchmarks.timing import timed
 
 
 def build(folder: Path) -> Field:
@@ -72,9 +72,7 @@ def _simulator(mujoco: Any, model: Any, states: States) -> Simulator:
         model.opt.timestep = duration / steps
         data = mujoco.MjData(model)
         data.qpos, data.qvel = states.q[0], states.v[0]
-        start = time.process_time()
-        mujoco.mj_step(model, data, nstep=steps)
-        seconds = time.process_time() - start
-        return Motion(np.array(data.qpos), seconds, 4 * steps)
+        _, taken = timed(lambda: mujoco.mj_step(model, data, nstep=steps))
+        return Motion(np.array(data.qpos), taken.cpu, 4 * steps)
 
     return Simulator("RK4", True, simulate)

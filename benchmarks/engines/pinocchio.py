@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from benchmarks.engines.base import Contestant, Field, Motion, Offer, Simulator
 from benchmarks.machine import Array, Body, States, read_bodies
+from benchmarks.timing import timed
 
 
 def build(folder: Path) -> Field:
@@ -75,13 +75,10 @@ def _simulator(
 
     def simulate(duration: float, setting: float) -> Motion:
         y0 = np.concatenate([states.q[0], states.v[0]])
-        start = time.process_time()
-        found = solve_ivp(
-            rates, (0.0, duration), y0, method, t_eval=[duration], rtol=setting, atol=setting
-        )
-        seconds = time.process_time() - start
+        options = {"t_eval": [duration], "rtol": setting, "atol": setting}
+        found, taken = timed(lambda: solve_ivp(rates, (0.0, duration), y0, method, **options))
         if not found.success:
             raise RuntimeError(str(found.message))
-        return Motion(np.array(found.y[:nv, -1]), seconds, int(found.nfev))
+        return Motion(np.array(found.y[:nv, -1]), taken.cpu, int(found.nfev))
 
     return Simulator(f"SciPy {method}", False, simulate)

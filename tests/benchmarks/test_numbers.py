@@ -1,10 +1,12 @@
 """From turns to ratios, from points to times at an error, from rows to targets and tables."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks import timing
 from benchmarks.cases.simulation import Point, give_up, time_at
 from benchmarks.compiling import _flags
 from benchmarks.engines.table import BY_NAME
@@ -243,3 +245,25 @@ def test_flags_keep_what_changes_the_code():
         assert flag in kept
     for noise in ("-Wall", "-fPIC", "/b", "-c"):
         assert noise not in kept.split()
+
+
+def test_every_study_goes_by_the_same_clock():
+    folder = Path(timing.__file__).parent
+    clocks = ("perf_counter", "process_time", "monotonic", "time.time(", "chrono", "clock()")
+    found = {
+        path.relative_to(folder).as_posix()
+        for suffix in ("py", "hpp", "cpp")
+        for path in folder.rglob(f"*.{suffix}")
+        if any(clock in path.read_text() for clock in clocks)
+    }
+    assert found == {"timing.py", "cpp/timing.hpp"}
+
+
+def test_the_clock_returns_what_the_call_returns_and_counts_its_work():
+    result, taken = timing.timed(lambda: sum(range(2_000_000)))
+    assert result == 1_999_999_000_000
+    assert taken.seconds > 0
+    assert taken.cpu > 0
+    calls = []
+    timing.least_cpu(lambda: calls.append(None), turns=3)
+    assert len(calls) == 3
