@@ -102,7 +102,10 @@ def show_run(run: Run, as_json: bool) -> None:
     )
     if beyond:
         screen.print(_limit_note(beyond), markup=False)
-    screen.print(f"Results: {shown_path(run.path)}", markup=False)
+    if run.path is None:
+        screen.print("No results written: the run failed at its start, the older one was kept.")
+    else:
+        screen.print(f"Results: {shown_path(run.path)}", markup=False)
 
 
 def _limit_note(beyond: Sequence[Mapping[str, Any]]) -> str:

@@ -8,9 +8,8 @@ samples whose time is finite are exactly those that are complete, wherever the p
 
 from __future__ import annotations
 
+import contextlib
 import os
-import secrets
-import shutil
 import time as clock
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,10 +20,11 @@ import numpy as np
 from linkwise._core import InputError
 from linkwise.base import AnyArray
 from linkwise.record.checksums import GROUP
-from linkwise.record.claim import check_target, hold, release
+from linkwise.record.claim import check_target, hold, is_run, release
 from linkwise.record.machine import write_model
 from linkwise.record.provenance import plain
 from linkwise.record.read import open_dataset
+from linkwise.record.replace import beside, clear_leftovers, remove_run, take_place
 from linkwise.record.schema import TIME_ATTRS, Coordinate, Schema, Variable
 
 if TYPE_CHECKING:
@@ -39,6 +39,8 @@ CHUNK_BYTES = 4 << 20
 MAX_BLOCK_ROWS = 4096
 SCALAR_ROWS = 4096
 FLUSH_SECONDS = 2.0
+SPARE = "spare"
+SPARE_BYTES = 64 << 10
 MOST_LINES = 100_000  # older ones in the list of checksums, which is then written anew
 
 
@@ -66,7 +68,8 @@ def chunk_shape(variable: Variable, rows: int) -> tuple[int, ...]:
 class RunWriter:
     """Writes one run to `path`, which appears at once and whole: a group with no samples yet.
 
-    An existing linkwise run at `path` is replaced; anything else there is refused.
+    An existing linkwise run at `path` is replaced when this one has samples beyond its start;
+    anything else there is refused.
     """
 
     def __init__(
@@ -81,8 +84,10 @@ class RunWriter:
     ) -> None:
         self._shown = repr(os.fspath(path))
         # Absolute: a drive or another thread may change the folder of the process.
-        self.path = Path(os.path.abspath(path))
-        check_target(self.path)
+        target = Path(os.path.abspath(path))
+        clear_leftovers(target)
+        check_target(path)
+        self.path: Path | None = target
         self._schema = schema
         self._samples = samples
         self._rows = block_rows(schema, samples)
@@ -91,27 +96,48 @@ class RunWriter:
         self._pending: list[tuple[AnyArray, dict[str, AnyArray]]] = []
         self._waiting = 0
         self._flushed = clock.monotonic()
-        aside = self.path.with_name(f".{self.path.name}.{secrets.token_hex(4)}.new")
+        self._broken = False
+        self._aside: Path | None = beside(target, "new")
+        self._old_lock: int | None = None
         try:
-            os.mkdir(aside)
+            os.mkdir(self._aside)
         except OSError as error:
             raise InputError(
-                f"output {str(path)!r}: cannot write there ({error.strerror}); choose another path"
+                f"output {self._shown}: cannot write there ({error.strerror}); choose another path"
             ) from None
-        self._lock = hold(aside)
+        self._lock = hold(self._aside)
         try:
-            self._create(aside, attrs, model)
-            _move_into_place(aside, self.path)
+            self._create(self._aside, attrs, model)
+            if is_run(target):  # stays until this run has samples
+                self._old_lock = hold(target)
+                self._open(self._aside)
+            else:
+                self._take_place()
         except BaseException as error:
-            release(self._lock)
-            shutil.rmtree(aside, ignore_errors=True)
+            self._give_up()
             if isinstance(error, OSError):
                 raise OSError(
                     f"output {self._shown}: cannot be written ({error.strerror}); make room or "
                     "choose another path"
                 ) from error
             raise
+
+    def _take_place(self) -> None:
+        assert self._aside is not None
+        assert self.path is not None
+        release(self._old_lock)
+        self._old_lock = None
+        take_place(self._aside, self.path)
+        self._aside = None
         self._open(self.path)
+
+    def _give_up(self) -> None:
+        """Nobody writes any more; a run that never took its place goes."""
+        release(self._lock)
+        release(self._old_lock)
+        self._lock = self._old_lock = None
+        if self._aside is not None:
+            remove_run(self._aside)
 
     def _open(self, where: Path) -> None:
         import zarr
@@ -152,6 +178,9 @@ class RunWriter:
         if model is not None:
             write_model(group, model)
         group.update_attributes({name: plain(value) for name, value in attrs.items()})
+        # Room for the last words of a run that fills the disk; no file system packs these bytes.
+        size = SPARE_BYTES + 2 * (where / "zarr.json").stat().st_size
+        (where / GROUP / SPARE).write_bytes(os.urandom(size))
 
     def append(self, chunk: Mapping[str, Any]) -> None:
         """Take what one call of `Simulation.advance` returned."""
@@ -202,26 +231,43 @@ class RunWriter:
             self._arrays["time"][where] = times  # last: it says that the others are complete
             self._store.shorten_list(MOST_LINES)
         except OSError as error:
+            self._broken = True  # later samples must not come in the place of these
             raise OSError(
                 f"output {self._shown}: cannot be written further ({error.strerror}); make "
                 f"room or choose another path (the {self._written} samples there are complete)"
             ) from error
         self._written += count
         self._flushed = clock.monotonic()
+        if self._aside is not None and self._written > 1:  # more than the state at the start
+            self._take_place()
 
     def flush(self) -> None:
-        if self._waiting:
+        if self._waiting and not self._broken:
             self._write(self._waiting)
 
     def finish(self, attrs: Mapping[str, Any]) -> xr.Dataset:
-        """Write what waits and the final attributes; return the opened results."""
+        """Write what waits and the final attributes; return the opened results.
+
+        A run that failed at its start does not take the place of an older one: it is returned in
+        memory, and `path` is None.
+        """
+        folder = self._store.root
         try:
-            self.flush()
-            self._group.update_attributes({name: plain(value) for name, value in attrs.items()})
-            self._store.shorten_list()
+            (folder / GROUP / SPARE).unlink(missing_ok=True)
+            try:
+                self.flush()
+            finally:
+                self._group.update_attributes({name: plain(value) for name, value in attrs.items()})
+                with contextlib.suppress(OSError):
+                    self._store.shorten_list()
+            if self._aside is not None and attrs.get("outcome") == "converged":
+                self._take_place()
+            if self._aside is None:
+                return open_dataset(self._store.root, finished=True)
+            self.path = None
+            return open_dataset(self._aside, finished=True).load()
         finally:
-            release(self._lock)
-        return open_dataset(self.path, finished=True)
+            self._give_up()
 
 
 def _create_text(group: zarr.Group, name: str, coordinate: Coordinate) -> None:
@@ -240,23 +286,3 @@ def _create_text(group: zarr.Group, name: str, coordinate: Coordinate) -> None:
     )
     if values.size:
         array[:] = values.astype(object)
-
-
-def _move_into_place(new: Path, path: Path) -> None:
-    """Rename `new` to `path`; an old run there is moved away first and deleted afterwards."""
-    old: Path | None = None
-    while True:
-        try:
-            os.rename(new, path)  # refuses a directory that is not empty, so nothing is lost
-            break
-        except OSError as error:
-            check_target(path)
-            if old is not None or not path.exists():
-                raise InputError(
-                    f"output {str(path)!r}: cannot write there ({error.strerror}); "
-                    "choose another path"
-                ) from None
-            old = path.with_name(f".{path.name}.{secrets.token_hex(4)}.old")
-            os.rename(path, old)
-    if old is not None:
-        shutil.rmtree(old, ignore_errors=True)

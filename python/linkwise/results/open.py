@@ -11,6 +11,7 @@ from linkwise.record.checksums import LIST
 from linkwise.record.claim import is_being_written, run_attributes
 from linkwise.record.provenance import FORMAT_KEY, READABLE_VERSIONS, UNFINISHED
 from linkwise.record.read import open_dataset
+from linkwise.record.replace import restore
 from linkwise.results.run import Run
 
 
@@ -28,6 +29,7 @@ def open_run(path: str | os.PathLike[str]) -> Run:
     """
     where = Path(os.path.abspath(path))
     shown = f"run {str(path)!r}"
+    restore(where)
     if not where.exists():
         raise InputError(f"{shown}: does not exist; give a folder that linkwise wrote")
     attrs = run_attributes(where)

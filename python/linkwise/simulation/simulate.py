@@ -227,7 +227,8 @@ def simulate(
             "joint_load", "external_wrench", "energy", "statistics"; all by default.
         joints: Names of the joints to record; all by default.
         output: Path of a Zarr store to write while simulating; in memory when left out. An
-            existing linkwise run there is replaced, anything else is refused.
+            existing linkwise run there is replaced when this one has samples beyond its start;
+            a person's files in its folder stay. Anything else there is refused.
         progress: Called with a `Progress` a few times a second.
         on_failure: "raise" SimulationError (SimulationInterrupted on Ctrl-C), or "return" the run
             that ended early; its `outcome` says why.
