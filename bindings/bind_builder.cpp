@@ -20,7 +20,7 @@ AxisSpec axis_spec(nb::handle item) {
 
 void add_joint(ModelBuilder& builder, std::string name, const std::string& type, std::string parent,
                std::string child, nb::handle translation, nb::handle rotation, nb::handle axis,
-               nb::handle axes, double pitch, const nb::kwargs& properties) {
+               nb::handle axes, double pitch, nb::handle initial, const nb::kwargs& properties) {
   JointSpec joint;
   joint.name = std::move(name);
   joint.parent = std::move(parent);
@@ -31,6 +31,10 @@ void add_joint(ModelBuilder& builder, std::string name, const std::string& type,
     for (nb::handle item : axes) joint.axes.push_back(axis_spec(item));
   else if (!axis.is_none())
     joint.axes.push_back({AxisKind::revolute, vec3(axis, "axis"), 0});
+  if (!initial.is_none()) {
+    const ArrayIn given = as_array(initial, "initial");
+    joint.initial.assign(given.data(), given.data() + given.size());
+  }
   ModelBuilder::Properties values;
   for (auto [key, value] : properties) {
     values.emplace_back(nb::cast<std::string>(key), std::nullopt);
@@ -100,7 +104,7 @@ void bind_builder(nb::module_& m) {
           "centre of mass in link axes.")
       .def("add_joint", &add_joint, "name"_a, "type"_a, "parent"_a, "child"_a, nb::kw_only(),
            "translation"_a = nb::none(), "rotation"_a = nb::none(), "axis"_a = nb::none(),
-           "axes"_a = nb::none(), "pitch"_a = 0.0, "properties"_a,
+           "axes"_a = nb::none(), "pitch"_a = 0.0, "initial"_a = nb::none(), "properties"_a,
            "Adds a joint between two links.\n\n"
            "type: fixed, revolute, continuous, prismatic, helical, cylindrical, universal, "
            "spherical, planar,\n"
@@ -108,7 +112,9 @@ void bind_builder(nb::module_& m) {
            "in the parent link\n"
            "frame; axis (3,) in the joint frame (normal of a planar joint); axes: two for "
            "universal, a list of\n"
-           "(kind, axis) or (\"helical\", axis, pitch) for composite; pitch [m/rad].\n"
+           "(kind, axis) or (\"helical\", axis, pitch) for composite; pitch [m/rad];\n"
+           "initial: the joint's coordinates where a simulation starts, its zero position by "
+           "default.\n"
            "Properties, one value or one per degree of freedom: damping, friction, "
            "friction_velocity, stiffness,\n"
            "rest_position, armature, lower, upper, effort, velocity, limit_stiffness, "

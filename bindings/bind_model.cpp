@@ -143,6 +143,12 @@ void bind_sizes(ModelClass& c) {
           "neutral_configuration",
           [](const PyModel& s) { return to_numpy(s.model->neutral_configuration()); },
           "q (nq,) at the zero position: zeros, quaternions 0, 0, 0, 1.")
+      .def(
+          "initial_configuration",
+          [](const PyModel& s) { return to_numpy(s.model->initial_configuration()); },
+          "q (nq,) where simulations start unless told otherwise: as the file draws the machine, "
+          "which is the\n"
+          "zero position but for the free bodies of an MJCF.")
       .def("__repr__", [](const PyModel& s) {
         return "<linkwise.Model '" + s.model->spec().name +
                "': " + std::to_string(s.model->n_joints()) + " joints, nq " +

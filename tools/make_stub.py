@@ -29,8 +29,8 @@ TARGETS: tuple[str, ...]
 
 # Parameters that a binding takes as a Python object, by their name.
 ARRAYS = (
-    "acceleration axes axis com external f gravity guess inertia prescribed q q0 rotation target "
-    "tau times translation v v0 value values"
+    "acceleration axes axis com external f gravity guess inertia initial prescribed q q0 rotation "
+    "target tau times translation v v0 value values"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "axes": "Any",  # joint axes: one per direction, or none

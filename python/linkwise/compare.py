@@ -113,7 +113,7 @@ def driven_trajectory(model: Model, arguments: Mapping[str, Any], states: int) -
     return _record(
         simulation,
         model,
-        model.neutral_configuration() if q0 is None else q0,
+        model.initial_configuration() if q0 is None else q0,
         np.zeros(model.nv) if v0 is None else v0,
         float(arguments["duration"]) / 2,
         states,
@@ -123,11 +123,12 @@ def driven_trajectory(model: Model, arguments: Mapping[str, Any], states: int) -
 
 
 def random_pose(model: Model, rng: np.random.Generator) -> Array:
-    """Coordinates within their limits, up to 1 rad or m about neutral where there are none."""
-    q = np.array(model.neutral_configuration(), dtype=float)
+    """Coordinates within their limits, up to 1 rad or m about where it starts
+    where there are none."""
+    q = np.array(model.initial_configuration(), dtype=float)
     for k, joint in enumerate(model.joint_names):
         if model.joint_nq[k] != model.joint_nv[k]:
-            continue  # quaternions stay neutral
+            continue  # quaternions stay as they are
         places, rates = model.q_slice(joint), model.v_slice(joint)
         low = np.maximum(model.lower_limit[rates], q[places] - 1.0)
         high = np.minimum(model.upper_limit[rates], q[places] + 1.0)

@@ -3,8 +3,9 @@
 Every body keeps the axes of its MJCF body frame; its link frame lies at the anchor of its last
 joint (MuJoCo's ``pos`` of a joint), because a joint load is given at the joint point. Several
 joints on one body become a stack through links without mass. A hinge or slide counts from the
-pose drawn in the file; a free joint's position is the body's pose in the world, as in MuJoCo, so it
-is zero at the world's origin. :mod:`linkwise.io.mjcf_state` converts qpos and qvel.
+pose drawn in the file; a free joint's position is the body's pose in the world, as in MuJoCo, and
+it starts where the file draws it (``model.initial_configuration()``).
+:mod:`linkwise.io.mjcf_state` converts qpos and qvel.
 """
 
 from __future__ import annotations
@@ -93,6 +94,11 @@ class Names:
     def __init__(self, mj_model: Any) -> None:
         self.body = _named([mj_model.body(i).name for i in range(mj_model.nbody)], "body")
         self.joint = _named([mj_model.joint(i).name for i in range(mj_model.njnt)], "joint")
+
+
+def keyframe_names(mj_model: Any) -> list[str]:
+    """Names of the keyframes; those without one are called by their number, from 0."""
+    return [mj_model.key(i).name or str(i) for i in range(mj_model.nkey)]
 
 
 def _named(given: list[str], kind: str) -> list[str]:
@@ -190,6 +196,10 @@ def _properties(mj_model: Any, joint: int) -> dict[str, Any]:
     """Passive forces, rotor inertia and range of one joint, as keywords of add_joint."""
     dofs = _dofs(mj_model, joint)
     result: dict[str, Any] = {"armature": _one_or_all(mj_model.dof_armature[dofs])}
+    if KINDS[mj_model.jnt_type[joint]] == "floating":
+        first = int(mj_model.jnt_qposadr[joint])
+        drawn = mj_model.qpos0[first : first + 7]
+        result["initial"] = [*drawn[:3], *drawn[4:], drawn[3]]
     if _enabled(mj_model, "DAMPER"):
         result["damping"] = _one_or_all(mj_model.dof_damping[dofs])
     if _enabled(mj_model, "FRICTIONLOSS"):
@@ -240,17 +250,23 @@ def _ignored(mj_model: Any) -> Iterator[tuple[str, str, str]]:
     if mj_model.jnt_limited.any():
         count = np.count_nonzero(mj_model.jnt_limited)
         yield "info", "range", f"{count} joint ranges kept as numbers: they do not stop the motion"
-    for element, count in (("sensor", mj_model.nsensor), ("keyframe", mj_model.nkey)):
-        if count:
-            yield "info", element, f"{count} ignored"
+    if mj_model.nsensor:
+        yield "info", "sensor", f"{mj_model.nsensor} ignored"
+    if mj_model.nkey:
+        names = ", ".join(f"'{shorten(name)}'" for name in keyframe_names(mj_model)[:8])
+        yield "info", "keyframe", f"{names}: a scenario starts there with [initial] keyframe"
 
 
 def _joint_notes(mj_model: Any, names: Names) -> Iterator[tuple[str, str, str]]:
     for joint, name in enumerate(names.joint):
         if KINDS[mj_model.jnt_type[joint]] == "floating":
-            drawn = mj_model.body_pos[mj_model.jnt_bodyid[joint]]
-            if drawn.any():
-                text = "its zero is at the world's origin; the file draws it at {:g} {:g} {:g}"
+            first = int(mj_model.jnt_qposadr[joint])
+            drawn = mj_model.qpos0[first : first + 7]
+            if drawn[:3].any() or drawn[4:].any():
+                text = (
+                    "starts where the file draws it: at {:g} {:g} {:g}, "
+                    "turned by the quaternion (w x y z) {:g} {:g} {:g} {:g}"
+                )
                 yield "info", name, text.format(*drawn)
         several = KINDS[mj_model.jnt_type[joint]] in ("floating", "spherical")
         if several and mj_model.jnt_stiffness[joint]:

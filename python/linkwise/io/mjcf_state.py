@@ -7,6 +7,7 @@ velocity of a MuJoCo free joint is along the world axes, linkwise's along the bo
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,10 @@ import numpy.typing as npt
 
 from linkwise._core import InputError
 from linkwise.base import Array
-from linkwise.io.mjcf import KINDS, Names, rotation
+from linkwise.io.complaint import near, shorten
+from linkwise.io.mjcf import KINDS, Names, compile_mjcf, keyframe_names, rotation
+from linkwise.io.mjcf_limits import check_mjcf
+from linkwise.io.xml import local_name, parse_xml
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -107,6 +111,39 @@ def acceleration_from_mujoco(
             linear, angular = v[first : first + 3], v[first + 3 : first + 6]
             a[first : first + 3] -= np.cross(angular, linear)
     return a
+
+
+def read_keyframe(
+    model: Model, path: str | os.PathLike[str], key: str | int
+) -> tuple[Array, Array]:
+    """q (nq,) and v (nv,) of a <key> of the MJCF file from which ``model`` was loaded.
+
+    key: its name, or its number from 0. Raises InputError where the file has no such keyframe, or
+    one that moves mocap bodies, which are fixed here. Its time, activations and controls are
+    ignored, for so are the actuators.
+    """
+    root = parse_xml(path)
+    if local_name(root) != "mujoco":
+        raise InputError("only an MJCF file has keyframes; remove it")
+    check_mjcf(path, root)
+    mj_model = compile_mjcf(path)
+    names = keyframe_names(mj_model)
+    if str(key) not in names:
+        remedy = near(str(key), names, "the keyframes are")
+        raise InputError(f"the file has no keyframe '{shorten(key)}'; {remedy}")
+    index = names.index(str(key))
+    drawn = mj_model.body_mocapid >= 0
+    moved = mj_model.key_mpos[index].reshape(-1, 3) - mj_model.body_pos[drawn]
+    if moved.any() or (mj_model.key_mquat[index].reshape(-1, 4) - mj_model.body_quat[drawn]).any():
+        raise InputError(
+            f"keyframe '{shorten(key)}' moves mocap bodies, which are fixed here; draw them there"
+        )
+    qpos = np.array(mj_model.key_qpos[index])
+    for _, kind, where, _ in _joints(mj_model):  # written with a few digits
+        if kind in ("floating", "spherical"):
+            qpos[where][-4:] /= np.linalg.norm(qpos[where][-4:])
+    q = position_from_mujoco(model, mj_model, qpos)
+    return q, velocity_from_mujoco(model, mj_model, qpos, mj_model.key_qvel[index])
 
 
 def _joints(mj_model: Any) -> Iterator[tuple[str, str, slice, slice]]:

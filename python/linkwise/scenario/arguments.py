@@ -15,6 +15,7 @@ from linkwise import drives
 from linkwise._core import InputError, Model, integrators, methods, solvers
 from linkwise.base import COMPONENTS
 from linkwise.io.complaint import complain, near, shorten
+from linkwise.io.mjcf_state import read_keyframe
 from linkwise.io.table import CsvTable, read_table
 from linkwise.io.units import check_dimension
 from linkwise.loads.rating import Rating
@@ -84,11 +85,14 @@ class ArgumentBuilder:
     def state(self, key: str) -> npt.NDArray[np.float64] | None:
         """q0 ("position") or v0 ("velocity"); None where the file says nothing."""
         given: dict[str, Quantity | list[Quantity]] = getattr(self.source.settings.initial, key)
-        if not given:
-            return None
-        model = self.model
+        model, keyframe = self.model, self._keyframe()
         position = key == "position"
-        state = np.array(model.neutral_configuration()) if position else np.zeros(model.nv)
+        if keyframe is not None:
+            state = keyframe[0 if position else 1]
+        elif not given:
+            return None
+        else:
+            state = np.array(model.initial_configuration()) if position else np.zeros(model.nv)
         for joint, values in given.items():
             keys = ("initial", key, joint)
             units = self._units(joint, keys, positions=position)
@@ -97,6 +101,22 @@ class ArgumentBuilder:
                 numbers[-4:] = self._quaternion(numbers[-4:], keys)
             state[model.q_slice(joint) if position else model.v_slice(joint)] = numbers
         return state
+
+    def _keyframe(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]] | None:
+        """q and v of the keyframe that the file names, or None."""
+        settings = self.source.settings
+        name = settings.initial.keyframe
+        if name is None:
+            return None
+        keys = ("initial", "keyframe")
+        if settings.model.path is None:
+            self.source.complain(keys, "belongs to an MJCF file", "remove it")
+        try:
+            return read_keyframe(self.model, self.source.resolve(settings.model.path), name)
+        except InputError as error:
+            raise InputError(
+                f"{shorten(self.source.path, 400)}: {key_path(keys)}: {error}"
+            ) from None
 
     def _quaternion(
         self, quaternion: npt.NDArray[np.float64], keys: Sequence[str]

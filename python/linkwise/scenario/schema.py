@@ -89,8 +89,10 @@ class ModelSection(Section):
 
 
 class InitialSection(Section):
-    """Initial state by joint name; joints not named are at zero and at rest."""
+    """Initial state by joint name; joints not named start as the model is drawn, or as its
+    keyframe says, and at rest."""
 
+    keyframe: str | int | None = None
     position: dict[str, Vector] = {}
     velocity: dict[str, Vector] = {}
 

@@ -126,7 +126,8 @@ def simulate_batch(
             state has none to share them with.
         step: Step of the integrator [s].
         duration: Seconds to simulate; may be left out when `times` are given.
-        q0: Initial coordinates (..., nq); the neutral configuration by default.
+        q0: Initial coordinates (..., nq); the model's `initial_configuration()` by
+            default.
         v0: Initial velocities (..., nv); zero by default.
         tau: Constant joint torques (..., nv) beside the drives. The leading axes of q0, v0 and tau
             broadcast to those of the members.
@@ -155,7 +156,7 @@ def simulate_batch(
     if unknown:
         raise InputError(f"quantities: a batch has no {unknown[0]!r}; use {', '.join(QUANTITIES)}")
     given = {
-        "q0": _rows("q0", first.neutral_configuration() if q0 is None else q0, first.nq),
+        "q0": _rows("q0", first.initial_configuration() if q0 is None else q0, first.nq),
         "v0": _rows("v0", np.zeros(first.nv) if v0 is None else v0, first.nv),
     }
     if tau is not None:

@@ -208,7 +208,8 @@ def simulate(
             a number, one number per degree of freedom, or a callable `f(t, q, v)` of the joint's
             own coordinates and velocities. Joints without a drive move freely.
         wrenches: Per body name an external `Wrench`.
-        q0: Initial coordinates, shape (nq,); the neutral configuration by default.
+        q0: Initial coordinates, shape (nq,); the model's
+            `initial_configuration()` by default.
         v0: Initial velocities, shape (nv,); zero by default.
         every: Interval between samples [s]; a thousandth of the duration by default.
         times: The sample times instead [s], increasing.
@@ -240,7 +241,7 @@ def simulate(
     """
     sampled = sample_times(duration, every, times)
     start = (
-        state_vector("q0", q0, model.nq, model.neutral_configuration()),
+        state_vector("q0", q0, model.nq, model.initial_configuration()),
         state_vector("v0", v0, model.nv, np.zeros(model.nv)),
     )
     by_joint, by_body = check_driven(model, drives, wrenches)

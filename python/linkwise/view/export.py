@@ -157,7 +157,7 @@ def _poses(model: Model, q: Array, link_poses: npt.NDArray[np.int64]) -> Array:
 
 def _still(source: Source) -> Animation:
     model = source.model
-    q = model.neutral_configuration()
+    q = model.initial_configuration()
     where = _link_poses(model, q)
     poses, loads = _poses(model, q, where)[None], static_loads(model, q)[None, None]
     return Animation(np.zeros(1), poses.astype(np.float32), where, loads.astype(np.float32), [])

@@ -29,7 +29,7 @@ class JointSliders:
         self, server: viser.ViserServer, model: Model, size: float, requests: Requests
     ) -> None:
         self._model = model
-        self.q = model.neutral_configuration()
+        self.q = model.initial_configuration()
         self._sliders: list[Any] = []
         self._resets: list[float] = []
         joints = self._shown_joints()
@@ -61,26 +61,27 @@ class JointSliders:
         plain = [k for k in range(len(scalars.labels)) if k not in turning]
         for k in plain:
             reach = size if str(scalars.units[k]) == "m" else math.pi
-            low, high = _limits(model, dof + k if not turning else -1, reach)
+            start = self.q[first + k]
+            low, high = _limits(model, dof + k if not turning else -1, start, reach)
             label, at = f"{scalars.labels[k]} [{scalars.units[k]}]", first + k
 
             def move(value: float, at: int = at) -> None:
                 self.q[at] = value
 
-            self._add(server, label, low, high, requests, move, self.q[at])
+            self._add(server, label, low, high, requests, move, start)
         if turning:
-            angles = np.zeros(3)
             name = model.joint_names[joint]
             where = slice(first + turning[0], first + turning[0] + 4)
+            angles = angles_of(self.q[where])
             for axis in range(3):
 
                 def turn(value: float, axis: int = axis) -> None:
                     angles[axis] = value
                     self.q[where] = quaternion_of(angles)
 
-                self._add(
-                    server, f"{name}.{'xyz'[axis]} [rad]", -math.pi, math.pi, requests, turn, 0
-                )
+                label = f"{name}.{'xyz'[axis]} [rad]"
+                start = angles[axis]
+                self._add(server, label, -math.pi, math.pi, requests, turn, start)
 
     def _add(
         self,
@@ -116,13 +117,25 @@ def _in_quaternion(label: Any, scalars: Any) -> bool:
     return str(label).rpartition(".")[2] in ("qx", "qy", "qz", "qw") and len(scalars.labels) >= 4
 
 
-def _limits(model: Model, dof: int, reach: float) -> tuple[float, float]:
-    """The joint's own limits where both are finite and apart, else a reach around zero."""
+def _limits(model: Model, dof: int, start: float, reach: float) -> tuple[float, float]:
+    """The joint's own limits where both are finite and apart, else a reach around the start."""
     if dof >= 0:
         low, high = float(model.lower_limit[dof]), float(model.upper_limit[dof])
         if math.isfinite(low) and math.isfinite(high) and high > low:
             return low, high
-    return -reach, reach
+    return start - reach, start + reach
+
+
+def angles_of(quaternion: Array) -> Array:
+    """The turns about x, then y, then z, that :func:`quaternion_of` makes this quaternion of."""
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+            math.asin(min(1.0, max(-1.0, 2 * (w * y - z * x)))),
+            math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+        ]
+    )
 
 
 def quaternion_of(angles: Array) -> Array:

@@ -134,7 +134,7 @@ class View:
 
     def _draw_pose(self) -> None:
         model = self._source.model
-        q = model.neutral_configuration() if self._sliders is None else self._sliders.q.copy()
+        q = model.initial_configuration() if self._sliders is None else self._sliders.q.copy()
         loads = static_loads(model, q)
         largest = tuple(
             float(np.linalg.norm(half, axis=1).max(initial=0.0))

@@ -75,7 +75,7 @@ class Scene:
         self._few = model.n_joints <= _MANY
         self.layers: dict[str, list[Layer]] = defaultdict(list)
         self.joint_marks: Any = None
-        start = model.neutral_configuration()
+        start = model.initial_configuration()
         if source.recording is not None:
             start = source.recording.position(0)
         self._snapshot = self.at(start, None)

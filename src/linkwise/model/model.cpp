@@ -90,6 +90,15 @@ std::vector<double> Model::neutral_configuration() const {
   return q;
 }
 
+std::vector<double> Model::initial_configuration() const {
+  std::vector<double> q = neutral_configuration();
+  for (int j = 0; j < n_joints(); ++j) {
+    const std::vector<double>& initial = joint_spec(j).initial;
+    std::copy(initial.begin(), initial.end(), q.begin() + joints[j].q);
+  }
+  return q;
+}
+
 std::string Model::body_name(int body) const {
   for (const JointInfo& j : joints)
     if (j.body == body && j.last_of_body) return links[j.link].name;

@@ -94,6 +94,8 @@ class Model {
   int link_index(const std::string& name) const;
   /// q at the zero position: zeros, quaternions (0, 0, 0, 1).
   std::vector<double> neutral_configuration() const;
+  /// q where the machine starts: as its joints' specs say, else at the zero position.
+  std::vector<double> initial_configuration() const;
   /// The tail of messages about an element of this model.
   std::string where() const { return source_of(spec_); }
   bool has_passive_forces() const { return has_passive_; }

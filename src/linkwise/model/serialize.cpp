@@ -1,5 +1,6 @@
 // A ModelSpec as a flat byte string: plain numbers in the machine's order, counts as 64-bit
 // integers. One function names what is stored and in which order; an archive writes or reads it.
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <type_traits>
@@ -26,6 +27,7 @@ struct Writer {
     const std::uint64_t n = values.size();
     raw(&n, sizeof(n));
   }
+  bool goes_on(bool more) const { return more; }
 };
 
 struct Reader {
@@ -58,6 +60,7 @@ struct Reader {
     if (n > bytes.size() - at) fail("cut short");
     values.resize(n);
   }
+  bool goes_on(bool) const { return at < bytes.size(); }
 };
 
 template <class A, class Text>
@@ -112,6 +115,14 @@ void spec_fields(A& archive, Spec& spec) {
     archive.choice(n.level, 3);
     text(archive, n.element);
     text(archive, n.text);
+  }
+  // Left out where no joint has any, so that machines without are described as they always were.
+  const bool starts = std::any_of(spec.joints.begin(), spec.joints.end(),
+                                  [](const JointSpec& j) { return !j.initial.empty(); });
+  if (!archive.goes_on(starts)) return;
+  for (auto& j : spec.joints) {
+    archive.size(j.initial);
+    archive.raw(j.initial.data(), j.initial.size() * sizeof(double));
   }
 }
 

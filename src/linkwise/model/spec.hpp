@@ -98,6 +98,7 @@ struct JointSpec {
   Vec3<double> translation;      ///< joint point in the parent link frame, m
   std::vector<AxisSpec> axes;    ///< one for the 1-DOF types and planar (its normal)
   std::vector<DofValue> dof;
+  std::vector<double> initial;  ///< coordinates where it starts; empty: the zero position
 };
 
 enum class NoteLevel { merge, warning, info };

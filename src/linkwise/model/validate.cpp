@@ -15,6 +15,33 @@ bool finite(const Vec3<double>& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+/// As many finite coordinates as the joint has, or none; quaternions are brought to length 1.
+void validate_initial(JointSpec& joint, const std::string& head) {
+  if (joint.initial.empty()) return;
+  int nq = 0;
+  for (int k = 0; k < n_joint_elements(joint); ++k) nq += info_of(joint_element(joint, k).kind).nq;
+  if (joint.initial.size() != static_cast<size_t>(nq))
+    throw InputError(head + "initial has " + std::to_string(joint.initial.size()) +
+                     " numbers; give its " + std::to_string(nq) + " coordinates");
+  for (double x : joint.initial)
+    if (!std::isfinite(x))
+      throw InputError(head + "initial is not finite; give finite coordinates");
+  double* q = joint.initial.data();
+  for (int k = 0; k < n_joint_elements(joint); ++k) {
+    const auto& info = info_of(joint_element(joint, k).kind);
+    if (info.quaternion >= 0) {
+      double* c = q + info.quaternion;
+      const double length = std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + c[3] * c[3]);
+      if (std::abs(length - 1) > 1e-3)
+        throw InputError(head + "initial has a quaternion of length " + number_text(length) +
+                         "; give a unit quaternion x y z w");
+      if (std::abs(length - 1) > 1e-15)
+        for (int i = 0; i < 4; ++i) c[i] /= length;
+    }
+    q += info.nq;
+  }
+}
+
 int edit_distance(const std::string& a, const std::string& b) {
   std::vector<int> row(b.size() + 1);
   for (size_t j = 0; j <= b.size(); ++j) row[j] = static_cast<int>(j);
@@ -146,6 +173,7 @@ void validate_joint(JointSpec& joint, const std::string& where) {
     if (!std::isfinite(a.pitch))
       throw InputError(head + "pitch is not finite; give the advance in m per rad");
   }
+  validate_initial(joint, head);
   const int nv = joint_dof(joint);
   if (nv > 6)
     throw InputError(head + "has " + std::to_string(nv) +
