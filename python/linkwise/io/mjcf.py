@@ -19,6 +19,7 @@ import numpy as np
 from linkwise._core import InputError, Model, ModelBuilder
 from linkwise.base import Array
 from linkwise.io.complaint import complain, file_name, shorten
+from linkwise.io.mjcf_transmissions import Transmissions
 
 KINDS = ("floating", "spherical", "prismatic", "revolute")
 """Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
@@ -43,8 +44,10 @@ def read_mjcf(
     stem = os.path.splitext(os.path.basename(file_name(path)))[0]
     builder = ModelBuilder(stem, gravity=gravity, source=file_name(path))
     try:
-        _add_bodies(builder, mj_model, names)
-        for level, element, text in [*_ignored(mj_model), *_joint_notes(mj_model, names)]:
+        added = Transmissions(mj_model)
+        _add_bodies(builder, mj_model, names, added)
+        notes = [*_ignored(mj_model), *added.notes(), *_joint_notes(mj_model, names)]
+        for level, element, text in notes:
             builder.add_note(level, element, text)
         return builder.build(keep_fixed=keep_fixed)
     except InputError as error:
@@ -137,7 +140,7 @@ def _anchor(mj_model: Any, body: int) -> Array:
     return np.array(mj_model.jnt_pos[joints[-1]]) if joints else np.zeros(3)
 
 
-def _add_bodies(builder: ModelBuilder, mj_model: Any, names: Names) -> None:
+def _add_bodies(builder: ModelBuilder, mj_model: Any, names: Names, added: Transmissions) -> None:
     builder.add_link(names.body[0])
     for body in range(1, mj_model.nbody):
         turned = rotation(mj_model.body_iquat[body])
@@ -175,7 +178,7 @@ def _add_bodies(builder: ModelBuilder, mj_model: Any, names: Names) -> None:
                 inboard,
                 child,
                 **placed,
-                **_properties(mj_model, joint),
+                **_properties(mj_model, joint, added),
             )
             inboard, before = child, anchor
             placed = {"rotation": np.eye(3), "translation": np.zeros(3)}
@@ -192,26 +195,29 @@ def _dofs(mj_model: Any, joint: int) -> slice:
     return slice(first, first + (6, 3, 1, 1)[mj_model.jnt_type[joint]])
 
 
-def _properties(mj_model: Any, joint: int) -> dict[str, Any]:
+def _properties(mj_model: Any, joint: int, added: Transmissions) -> dict[str, Any]:
     """Passive forces, rotor inertia and range of one joint, as keywords of add_joint."""
     dofs = _dofs(mj_model, joint)
-    result: dict[str, Any] = {"armature": _one_or_all(mj_model.dof_armature[dofs])}
+    result: dict[str, Any] = {
+        "armature": _one_or_all(mj_model.dof_armature[dofs] + added.armature[dofs])
+    }
     if KINDS[mj_model.jnt_type[joint]] == "floating":
         first = int(mj_model.jnt_qposadr[joint])
         drawn = mj_model.qpos0[first : first + 7]
         result["initial"] = [*drawn[:3], *drawn[4:], drawn[3]]
     if _enabled(mj_model, "DAMPER"):
-        result["damping"] = _one_or_all(mj_model.dof_damping[dofs])
+        result["damping"] = _one_or_all(mj_model.dof_damping[dofs] + added.damping[dofs])
     if _enabled(mj_model, "FRICTIONLOSS"):
-        result["friction"] = _one_or_all(mj_model.dof_frictionloss[dofs])
+        result["friction"] = _one_or_all(mj_model.dof_frictionloss[dofs] + added.friction[dofs])
     if KINDS[mj_model.jnt_type[joint]] in ("floating", "spherical"):
         return result
     result["axis"] = np.array(mj_model.jnt_axis[joint])
     address = mj_model.jnt_qposadr[joint]
     zero = float(mj_model.qpos0[address])
     if _enabled(mj_model, "SPRING"):
-        result["stiffness"] = float(mj_model.jnt_stiffness[joint])
-        result["rest_position"] = float(mj_model.qpos_spring[address]) - zero
+        stiffness, rest = float(mj_model.jnt_stiffness[joint]), float(mj_model.qpos_spring[address])
+        result["stiffness"], rest = added.spring(dofs.start, stiffness, rest)
+        result["rest_position"] = rest - zero
     if mj_model.jnt_limited[joint]:
         lower, upper = mj_model.jnt_range[joint] - zero
         result |= {"lower": float(lower), "upper": float(upper)}
@@ -232,8 +238,11 @@ def _ignored(mj_model: Any) -> Iterator[tuple[str, str, str]]:
     counts = {
         "contact": (colliding + mj_model.npair, "geoms that can touch: contacts are ignored"),
         "equality": (mj_model.neq, "equality constraints ignored: loops stay open"),
-        "tendon": (mj_model.ntendon, "tendons ignored, with their springs and dampers"),
-        "actuator": (mj_model.nu, "actuators ignored: drive the joints instead"),
+        "tendon": (
+            mj_model.ntendon,
+            "tendons: only what is fixed to one joint counts",
+        ),
+        "actuator": (mj_model.nu, "actuators: no force of theirs acts, drive the joints instead"),
         "flex": (mj_model.nflex, "flexible objects ignored"),
         "plugin": (mj_model.nplugin, "plugins ignored"),
         "mocap": (mj_model.nmocap, "mocap bodies are fixed where the file draws them"),
