@@ -105,7 +105,7 @@ nb::object link_inertias(const PyModel& self) {
   double* row = out.data;
   for (const LinkSpec& link : links)
     for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) *row++ = link.inertia.m[sym_index(i, j)];
+      for (int j = 0; j < 3; ++j) *row++ = link.inertia.m[packed(i, j)];
   return out.array;
 }
 

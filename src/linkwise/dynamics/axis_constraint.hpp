@@ -47,13 +47,12 @@ LW_INLINE void to_components(const Compliance<S>& Phi, double pitch, S* D) {
 #pragma GCC unroll 6
   for (int i = 0; i < rows; ++i)
 #pragma GCC unroll 6
-    for (int j = 0; j <= i; ++j) D[sym_index(i, j)] = entry(Phi, place[i], place[j]);
+    for (int j = 0; j <= i; ++j) D[packed(i, j)] = entry(Phi, place[i], place[j]);
   if constexpr (J::turns && J::slides) {
-    D[sym_index(2, 2)] =
-        D[sym_index(2, 2)] + pitch * (pitch * entry(Phi, 5, 5) - 2.0 * entry(Phi, 5, 2));
+    D[packed(2, 2)] = D[packed(2, 2)] + pitch * (pitch * entry(Phi, 5, 5) - 2.0 * entry(Phi, 5, 2));
 #pragma GCC unroll 6
     for (int i = 0; i < rows; ++i)
-      if (i != 2) D[sym_index(i, 2)] = D[sym_index(i, 2)] - pitch * entry(Phi, 5, i);
+      if (i != 2) D[packed(i, 2)] = D[packed(i, 2)] - pitch * entry(Phi, 5, i);
   }
 }
 
@@ -69,7 +68,7 @@ void calc_across(const BodyConstants<double>& k, const Compliance<T>& Phi, Acros
     const Motion<T> K = to_motion(row);
     std::copy(row, row + 6, out.K[i]);
     to_components<J>(before_motion<J>(k, K), k.pitch, W);
-    for (int j = 0; j <= i; ++j) out.W[sym_index(i, j)] = W[j];
+    for (int j = 0; j <= i; ++j) out.W[packed(i, j)] = W[j];
   }
 }
 

@@ -85,7 +85,8 @@ void CompositeRigidBody::mass_matrix(const double* q, double* H) {
       H[dof_[i] * nv + dof_[j]] = H[dof_[j] * nv + dof_[i]] = H_[i * n_dof + j];
 }
 
-/// H = L^T L in place, from the tips down; returns false at a pivot that is not positive.
+/// H = L^T L in place, from the tips down, so that zeros stay zeros, which no other factor here
+/// does; returns false at a pivot that is not positive.
 bool CompositeRigidBody::factor() {
   const int n_dof = static_cast<int>(dof_.size());
   std::vector<double> whole(n_dof);

@@ -60,7 +60,7 @@ class GeneralElimination {
     Phi_ = Phi;
     across = {};
     std::fill(D, D + 21, S{});
-    for (int i = 0; i < 6; ++i) D[sym_index(i, i)] = broadcast<S>(1);
+    for (int i = 0; i < 6; ++i) D[packed(i, i)] = broadcast<S>(1);
     for (int i = 0; i < joint_.rows; ++i) {
       const Force<S> B = to_force(joint_.B[i].data());
       const Motion<S> y = Phi * B, K = before * transpose_times(X_, B), carried = X_ * K;
@@ -68,10 +68,10 @@ class GeneralElimination {
       std::copy(row.begin(), row.end(), across.K[i]);
       for (int j = 0; j <= i; ++j) {
         const Force<S> B_j = to_force(joint_.B[j].data());
-        D[sym_index(i, j)] = dot(y, B_j);
-        across.W[sym_index(i, j)] = dot(carried, B_j);
+        D[packed(i, j)] = dot(y, B_j);
+        across.W[packed(i, j)] = dot(carried, B_j);
       }
-      D[sym_index(i, i)] = D[sym_index(i, i)] + joint_.compliance[i];
+      D[packed(i, i)] = D[packed(i, i)] + joint_.compliance[i];
     }
   }
 

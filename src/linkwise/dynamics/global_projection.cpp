@@ -66,7 +66,8 @@ void GlobalProjection::project(const SweepInput<double>& in) {
   }
 }
 
-/// Cholesky of the lower triangle of H in place; the solution in rhs_.
+/// Cholesky of the lower triangle of H in place; the solution in rhs_. It shares no code with what
+/// it is compared with.
 bool GlobalProjection::factor_and_solve() {
   const size_t size = columns_.count();
   for (size_t k = 0; k < size; ++k) {

@@ -19,8 +19,8 @@ struct Across {
 
 template <class S>
 struct JointElimination {
-  S L[15], reciprocal[6];  ///< of S = L D L^T
-  S f[6];                  ///< D^-1 L^-1 b, in the end the joint's unknowns
+  S L[21];  ///< of S = L D L^T, packed, the diagonal holds 1 / D
+  S f[6];   ///< D^-1 L^-1 b, in the end the joint's unknowns
   union {
     Compliance<S> Phi;  ///< of the outboard body, until the joint is eliminated
     S V[6][6];          ///< D^-1 Z
@@ -32,7 +32,7 @@ struct JointElimination {
   template <int rows, class T>
   LW_INLINE S eliminate(S* D, const Across<T>& across, const Compliance<T>& before,
                         Compliance<S>& after) {
-    constexpr int entries = sym_index(rows, 0);
+    constexpr int entries = packed(rows, 0);
 #pragma GCC unroll 21
     for (int i = 0; i < entries; ++i) D[i] = D[i] + across.W[i];
     const Factor<rows> F = factor<rows>(D);
@@ -45,9 +45,9 @@ struct JointElimination {
         S z = across.K[i][c] + S{};
 #pragma GCC unroll 6
         for (int j = 0; j < rows; ++j)
-          if (j < i) z = z - F.L[below(i, j)] * Z[j][c];
+          if (j < i) z = z - F.L[packed(i, j)] * Z[j][c];
         Z[i][c] = z;
-        local[i][c] = F.reciprocal[i] * z;
+        local[i][c] = F.L[packed(i, i)] * z;
         V[i][c] = local[i][c];
       }
 #pragma GCC unroll 6
@@ -80,8 +80,8 @@ struct JointElimination {
       y[i] = b[i];
 #pragma GCC unroll 6
       for (int j = 0; j < rows; ++j)
-        if (j < i) y[i] = y[i] - L[below(i, j)] * y[j];
-      f[i] = reciprocal[i] * y[i];
+        if (j < i) y[i] = y[i] - L[packed(i, j)] * y[j];
+      f[i] = L[packed(i, i)] * y[i];
       taken += Motion<S>{{y[i] * V[i][0], y[i] * V[i][1], y[i] * V[i][2]},
                          {y[i] * V[i][3], y[i] * V[i][4], y[i] * V[i][5]}};
     }
@@ -101,7 +101,7 @@ struct JointElimination {
       const int i = rows - 1 - k;
 #pragma GCC unroll 6
       for (int j = 0; j < rows; ++j)
-        if (j > i) x[i] = x[i] - L[below(j, i)] * x[j];
+        if (j > i) x[i] = x[i] - L[packed(j, i)] * x[j];
     }
 #pragma GCC unroll 6
     for (int i = 0; i < rows; ++i) f[i] = x[i];
@@ -110,37 +110,34 @@ struct JointElimination {
  private:
   template <int rows>
   struct Factor {
-    S L[15], reciprocal[rows], least;
+    S L[21], least;
   };
-  /// Index below the diagonal, i > j.
-  static constexpr int below(int i, int j) { return i * (i - 1) / 2 + j; }
 
+  /// The twin of ldlt_factor() in linear: row by row, so that a lane register is written once.
   template <int rows>
   LW_INLINE Factor<rows> factor(const S* D) {
     Factor<rows> out;
 #pragma GCC unroll 6
     for (int i = 0; i < rows; ++i) {
       S t[rows];
-      S d = D[sym_index(i, i)];
+      S d = D[packed(i, i)];
 #pragma GCC unroll 6
       for (int j = 0; j < rows; ++j) {
         if (j >= i) continue;
-        t[j] = D[sym_index(i, j)];
+        t[j] = D[packed(i, j)];
 #pragma GCC unroll 6
         for (int l = 0; l < rows; ++l)
-          if (l < j) t[j] = t[j] - t[l] * out.L[below(j, l)];
-        out.L[below(i, j)] = t[j] * out.reciprocal[j];
-        d = d - t[j] * out.L[below(i, j)];
+          if (l < j) t[j] = t[j] - t[l] * out.L[packed(j, l)];
+        out.L[packed(i, j)] = t[j] * out.L[packed(j, j)];
+        d = d - t[j] * out.L[packed(i, j)];
       }
-      const S margin = d - smallest_pivot * D[sym_index(i, i)];
+      const S margin = d - smallest_pivot * D[packed(i, i)];
       out.least = i == 0 ? margin : smaller(out.least, margin);
-      out.reciprocal[i] = 1.0 / d;
+      out.L[packed(i, i)] = 1.0 / d;
     }
-    constexpr int n_below = below(rows, 0);
-#pragma GCC unroll 15
-    for (int i = 0; i < n_below; ++i) L[i] = out.L[i];
-#pragma GCC unroll 6
-    for (int i = 0; i < rows; ++i) reciprocal[i] = out.reciprocal[i];
+    constexpr int entries = packed(rows, 0);
+#pragma GCC unroll 21
+    for (int i = 0; i < entries; ++i) L[i] = out.L[i];
     return out;
   }
 };

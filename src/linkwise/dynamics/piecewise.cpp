@@ -164,7 +164,7 @@ class PiecewiseChain {
       for (int i = 0; i < cut_rows; ++i) {
         for (int j = 0; j < cut_rows; ++j)
           A_.diag[s][block_stride * i + j] =
-              e.QJQ[sym_index(i, j)][l] + (in ? in->PsiJPsi[sym_index(i, j)][li] : 0);
+              e.QJQ[packed(i, j)][l] + (in ? in->PsiJPsi[packed(i, j)][li] : 0);
         b_[cut_rows * s + i] = to_array(bias_[s])[i] - to_array(free)[i] +
                                (in ? in->beta[i][li] : to_array(from_ground)[i]);
         if (in)

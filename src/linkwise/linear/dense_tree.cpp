@@ -2,6 +2,7 @@
 
 namespace linkwise {
 
+// Not ldlt.hpp: nodes are wide, and rows may depend on each other.
 int DenseTree::factor(double dependent) {
   int left_out = -1;
   for (auto it = nodes.rbegin(); it != nodes.rend(); ++it) {

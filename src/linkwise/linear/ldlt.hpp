@@ -1,18 +1,17 @@
 #pragma once
 // L D L^T of one symmetric block, without square roots: five dependent divisions per 5 x 5 block
 // instead of five square roots and divisions. These are what the recursion along a chain waits for.
-// Packed lower triangle, entry (i, j) at i (i + 1) / 2 + j; the diagonal holds 1 / D.
+// Packed lower triangle; the diagonal holds 1 / D.
 
 #include <array>
 #include <cmath>
 
+#include "linkwise/base/packed.hpp"
 #include "linkwise/linear/block.hpp"
 
 namespace linkwise {
 
 using PackedLower = std::array<double, 21>;
-
-LW_INLINE constexpr int packed(int i, int j) { return i * (i + 1) / 2 + j; }
 
 /// Packs the lower triangle of a block.
 template <int dim>

@@ -3,30 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linkwise/linear/cholesky_root.hpp"
 #include "linkwise/linear/vector.hpp"
 
 namespace linkwise {
 namespace {
 
-/// C = R R^T of a hub's compliance, R full 6 x 6 with zeros above the diagonal. A direction with no
-/// compliance (a body held by the ground) gives a zero column; a negative one fails.
+/// C = R R^T of a hub's compliance. A direction with no compliance (a body held by the ground)
+/// gives a zero column; a negative one fails.
 bool compliance_root(const Block& compliance, Block& root) {
   double scale = 0.0;
   for (int i = 0; i < 6; ++i) scale = std::max(scale, std::abs(compliance[7 * i]));
-  root.fill(0.0);
-  for (int j = 0; j < 6; ++j) {
-    double pivot = compliance[7 * j];
-    for (int k = 0; k < j; ++k) pivot -= root[6 * j + k] * root[6 * j + k];
-    if (!(pivot >= -1e-12 * scale)) return false;
-    if (pivot <= 1e-15 * scale) continue;
-    root[7 * j] = std::sqrt(pivot);
-    for (int i = j + 1; i < 6; ++i) {
-      double sum = compliance[6 * i + j];
-      for (int k = 0; k < j; ++k) sum -= root[6 * i + k] * root[6 * j + k];
-      root[6 * i + j] = sum / root[7 * j];
-    }
-  }
-  return true;
+  return cholesky_root(6, compliance, -1e-12 * scale, 1e-15 * scale, root);
 }
 
 /// out = L^-1 B R, B dim x 6.

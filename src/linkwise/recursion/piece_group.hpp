@@ -166,9 +166,8 @@ class PieceGroup {
     for (int i = 0; i < cut_rows; ++i)
       for (int j = 0; j < cut_rows; ++j) {
         if (j <= i) {
-          ends.QJQ[sym_index(i, j)] = to_array(ends.JQ[j])[i];
-          ends.PsiJPsi[sym_index(i, j)] =
-              cut.Lambda[sym_index(i, j)] + dot(ends.JPsi[j], cut.Psi[i]);
+          ends.QJQ[packed(i, j)] = to_array(ends.JQ[j])[i];
+          ends.PsiJPsi[packed(i, j)] = cut.Lambda[packed(i, j)] + dot(ends.JPsi[j], cut.Psi[i]);
         }
         ends.PsiJQ[5 * i + j] = dot(ends.JQ[j], cut.Psi[i]);
       }

@@ -13,7 +13,7 @@ namespace linkwise {
 template <class S>
 struct EliminatedStack {
   Force<S> U[6];  ///< Y P
-  S L[36];        ///< of D = L L^T by rows, the diagonal as its reciprocal
+  S L[21];        ///< Cholesky factor of D
   S u[6];         ///< tau - P^T p
 };
 
@@ -23,24 +23,14 @@ template <class S>
 LW_INLINE bool eliminate(const GeneralState<S>& joint, const ArticulatedInertia<S>& Y,
                          const Force<S>& p, const double* armature, const S* tau,
                          EliminatedStack<S>& out) {
-  bool positive = true;
   for (int i = 0; i < joint.n; ++i) out.U[i] = Y * joint.P[i];
   for (int i = 0; i < joint.n; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      S d = dot(joint.P[i], out.U[j]);
-      if (i == j) d = d + armature[joint.dof[i]];
-      const S whole = d;
-      for (int l = 0; l < j; ++l) d = d - out.L[6 * i + l] * out.L[6 * j + l];
-      if (i == j) {
-        positive &= is_positive(S(d - smallest_pivot * whole));
-        out.L[7 * i] = 1.0 / square_root(d);
-      } else {
-        out.L[6 * i + j] = d * out.L[7 * j];
-      }
-    }
+    for (int j = 0; j <= i; ++j) out.L[packed(i, j)] = dot(joint.P[i], out.U[j]);
+    S& d = out.L[packed(i, i)];
+    d = d + armature[joint.dof[i]];
     out.u[i] = tau[joint.dof[i]] - dot(joint.P[i], p);
   }
-  return positive;
+  return cholesky_factor(joint.n, out.L, smallest_pivot);
 }
 
 /// Ya and pa in the places of Y and p.
@@ -54,10 +44,10 @@ LW_INLINE void reduce(int n_columns, const EliminatedStack<S>& stack, const Moti
     Force<S> column = stack.U[i];
     S y = stack.u[i];
     for (int l = 0; l < i; ++l) {
-      column -= Force<S>{stack.L[6 * i + l] * W[l].lin, stack.L[6 * i + l] * W[l].ang};
-      y = y - stack.L[6 * i + l] * z[l];
+      column -= Force<S>{stack.L[packed(i, l)] * W[l].lin, stack.L[packed(i, l)] * W[l].ang};
+      y = y - stack.L[packed(i, l)] * z[l];
     }
-    const S r = stack.L[7 * i];
+    const S r = stack.L[packed(i, i)];
     W[i] = {r * column.lin, r * column.ang};
     z[i] = r * y;
     subtract_outer(Y, W[i], W[i]);
@@ -66,26 +56,13 @@ LW_INLINE void reduce(int n_columns, const EliminatedStack<S>& stack, const Moti
   for (int i = 0; i < n_columns; ++i) p += Force<S>{z[i] * W[i].lin, z[i] * W[i].ang};
 }
 
-/// D^-1 y in the place of y.
-template <class S>
-LW_INLINE void solve_stack(int n_columns, const S* L, S* y) {
-  for (int i = 0; i < n_columns; ++i) {
-    for (int l = 0; l < i; ++l) y[i] = y[i] - L[6 * i + l] * y[l];
-    y[i] = y[i] * L[7 * i];
-  }
-  for (int i = n_columns - 1; i >= 0; --i) {
-    for (int l = i + 1; l < n_columns; ++l) y[i] = y[i] - L[6 * l + i] * y[l];
-    y[i] = y[i] * L[7 * i];
-  }
-}
-
 /// u and pa, in the place of p, for another right-hand side.
 template <class S>
 LW_INLINE void respond(const GeneralState<S>& joint, const ArticulatedInertia<S>& Ya,
                        const Motion<S>& c, const S* tau, EliminatedStack<S>& stack, Force<S>& p) {
   S y[6];
   for (int i = 0; i < joint.n; ++i) y[i] = stack.u[i] = tau[joint.dof[i]] - dot(joint.P[i], p);
-  solve_stack(joint.n, stack.L, y);
+  cholesky_solve(joint.n, stack.L, y);
   p += Ya * c;
   for (int i = 0; i < joint.n; ++i) p += Force<S>{y[i] * stack.U[i].lin, y[i] * stack.U[i].ang};
 }
@@ -97,7 +74,7 @@ LW_INLINE void accelerate(const GeneralState<S>& joint, const EliminatedStack<S>
   a += c;
   S y[6];
   for (int i = 0; i < joint.n; ++i) y[i] = stack.u[i] - dot(a, stack.U[i]);
-  solve_stack(joint.n, stack.L, y);
+  cholesky_solve(joint.n, stack.L, y);
   for (int i = 0; i < joint.n; ++i) {
     du[joint.dof[i]] = y[i];
     a += Motion<S>{y[i] * joint.P[i].lin, y[i] * joint.P[i].ang};

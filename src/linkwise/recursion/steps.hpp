@@ -70,13 +70,6 @@ LW_INLINE void store(ArticulatedInertia<S>& to, const ArticulatedInertia<S>& Y) 
 /// Stands for the armature of a joint that has none.
 struct NoRotor {};
 
-template <class S>
-LW_INLINE bool is_positive(const S& d) {
-  bool all = true;
-  for (int l = 0; l < lane_count<S>; ++l) all &= lane(d, l) > 0;
-  return all;
-}
-
 /// v_n = X v_p + P u.
 template <class J, class Place, class S>
 LW_INLINE Motion<S> outward_velocity(const Place& place, const Motion<S>& v_parent, double pitch,
@@ -171,7 +164,7 @@ LW_INLINE void carry_cut_forces(const Place& place, const EliminatedAxis<S>& axi
   for (int i = 0; i < cut_rows; ++i) {
     const S r = cut.Psi[i].ang.z, scaled = r * axis.D_inverse;
     row[i] = r;
-    for (int j = 0; j <= i; ++j) cut.Lambda[sym_index(i, j)] += scaled * cut.Psi[j].ang.z;
+    for (int j = 0; j <= i; ++j) cut.Lambda[packed(i, j)] += scaled * cut.Psi[j].ang.z;
     cut.beta[i] += scaled * axis.u;
   }
   const Force<S> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};

@@ -48,6 +48,14 @@ LW_INLINE double lane(const S& value, int index) {
   return value[index];
 }
 
+/// In all lanes.
+template <class S>
+LW_INLINE bool is_positive(const S& d) {
+  bool all = true;
+  for (int l = 0; l < lane_count<S>; ++l) all &= lane(d, l) > 0;
+  return all;
+}
+
 template <class S>
 LW_INLINE void set_lane(S& value, int index, double item) {
   if constexpr (std::is_same_v<S, double>)

@@ -190,7 +190,7 @@ LW_INLINE ArticulatedInertia<S> transform_to_parent(const Transform<T>& X,
   for (int i = 0; i < 3; ++i) {
     const S x = Y.xx * R[i] + Y.xy * R[3 + i], y = Y.xy * R[i] + Y.yy * R[3 + i];
 #pragma GCC unroll 3
-    for (int j = 0; j <= i; ++j) turned.C.m[sym_index(i, j)] = x * R[j] + y * R[3 + j];
+    for (int j = 0; j <= i; ++j) turned.C.m[packed(i, j)] = x * R[j] + y * R[3 + j];
   }
   return shift_to_parent(X.r, turned);
 }

@@ -57,8 +57,8 @@ LW_INLINE void subtract_outer(Symmetric& Y, const Force<S>& V, const Force<S>& U
   for (int i = 0; i < 3; ++i) {
 #pragma GCC unroll 3
     for (int j = 0; j <= i; ++j) {
-      Y.A.m[sym_index(i, j)] -= v[i] * u[j];
-      Y.C.m[sym_index(i, j)] -= v[3 + i] * u[3 + j];
+      Y.A.m[packed(i, j)] -= v[i] * u[j];
+      Y.C.m[packed(i, j)] -= v[3 + i] * u[3 + j];
     }
 #pragma GCC unroll 3
     for (int j = 0; j < 3; ++j) Y.B.m[3 * i + j] -= v[i] * u[3 + j];
@@ -74,7 +74,7 @@ LW_INLINE ArticulatedInertia<S> shift_to_parent(const Vec3<T>& r, const Articula
   auto& G = out.B.m;
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i) {
-    const S a0 = A[sym_index(i, 0)], a1 = A[sym_index(i, 1)], a2 = A[sym_index(i, 2)];
+    const S a0 = A[packed(i, 0)], a1 = A[packed(i, 1)], a2 = A[packed(i, 2)];
     G[3 * i] -= a1 * r.z - a2 * r.y;
     G[3 * i + 1] -= a2 * r.x - a0 * r.z;
     G[3 * i + 2] -= a0 * r.y - a1 * r.x;
@@ -92,7 +92,7 @@ LW_INLINE ArticulatedInertia<S> shift_to_parent(const Vec3<T>& r, const Articula
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i)
 #pragma GCC unroll 3
-    for (int j = 0; j <= i; ++j) out.C.m[sym_index(i, j)] += rg(i, j) - hr(i, j);
+    for (int j = 0; j <= i; ++j) out.C.m[packed(i, j)] += rg(i, j) - hr(i, j);
   return out;
 }
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <utility>
 
-#include "linkwise/simd/lanes.hpp"
+#include "linkwise/simd/cholesky.hpp"
 #include "linkwise/spatial/hinge.hpp"
 
 namespace linkwise {
@@ -35,45 +35,25 @@ LW_INLINE Force<S> to_force(const S* v) {
 template <class L>
 LW_INLINE auto& entry(L& matrix, int i, int j) {
   if (i < j) std::swap(i, j);
-  return i < 3   ? matrix.A.m[sym_index(i, j)]
+  return i < 3   ? matrix.A.m[packed(i, j)]
          : j < 3 ? matrix.B.m[3 * j + i - 3]
-                 : matrix.C.m[sym_index(i - 3, j - 3)];
+                 : matrix.C.m[packed(i - 3, j - 3)];
 }
 
-/// Cholesky factor of Y, packed rows with the reciprocal diagonal. False if a pivot of some lane is
-/// not above this part of its diagonal entry.
+/// Cholesky factor of Y (simd/cholesky.hpp).
 template <class S>
 bool factor(const ArticulatedInertia<S>& Y, S* L, double smallest_pivot = 0) {
-  bool ok = true;
   for (int i = 0; i < 6; ++i)
-    for (int j = 0; j <= i; ++j) {
-      const S whole = entry(Y, i, j);
-      S x = whole;
-      for (int l = 0; l < j; ++l) x = x - L[sym_index(i, l)] * L[sym_index(j, l)];
-      if (i == j) {
-        for (int l = 0; l < lane_count<S>; ++l)
-          ok &= lane(x, l) - smallest_pivot * lane(whole, l) > 0;
-        L[sym_index(i, i)] = 1.0 / square_root(x);
-      } else {
-        L[sym_index(i, j)] = x * L[sym_index(j, j)];
-      }
-    }
-  return ok;
+    for (int j = 0; j <= i; ++j) L[packed(i, j)] = entry(Y, i, j);
+  return cholesky_factor(6, L, smallest_pivot);
 }
 
 /// Y^-1 f with that factor.
 template <class S>
 Motion<S> solve(const S* L, const Force<S>& f) {
-  S x[6] = {f.lin.x, f.lin.y, f.lin.z, f.ang.x, f.ang.y, f.ang.z};
-  for (int i = 0; i < 6; ++i) {
-    for (int l = 0; l < i; ++l) x[i] = x[i] - L[sym_index(i, l)] * x[l];
-    x[i] = x[i] * L[sym_index(i, i)];
-  }
-  for (int i = 5; i >= 0; --i) {
-    for (int l = i + 1; l < 6; ++l) x[i] = x[i] - L[sym_index(l, i)] * x[l];
-    x[i] = x[i] * L[sym_index(i, i)];
-  }
-  return to_motion(x);
+  Vector6<S> x = to_array(f);
+  cholesky_solve(6, L, x.data());
+  return to_motion(x.data());
 }
 
 /// Inverse of a body's 6x6 inertia: [1/m - c~ Ic^-1 c~, c~ Ic^-1; ., Ic^-1], so that a = M^-1 w.
@@ -118,7 +98,7 @@ inline Compliance<double> invert_inertia(const Inertia<double>& M) {
     const Vec3<double> row{out.B.m[3 * i], out.B.m[3 * i + 1], out.B.m[3 * i + 2]};
     const Vec3<double> a = cross(c, row);
     const double values[3] = {a.x, a.y, a.z};
-    for (int j = 0; j <= i; ++j) out.A.m[sym_index(i, j)] = values[j] + (i == j ? 1 / M.m : 0);
+    for (int j = 0; j <= i; ++j) out.A.m[packed(i, j)] = values[j] + (i == j ? 1 / M.m : 0);
   }
   return out;
 }
@@ -171,8 +151,8 @@ LW_INLINE void slide_back(const S& d, Compliance<S>& L) {
   const S b01 = B[1], b00 = B[0], b10 = B[3];
 #pragma GCC unroll 3
   for (int j = 0; j < 3; ++j) {
-    B[j] = B[j] - d * C[sym_index(1, j)];
-    B[3 + j] = B[3 + j] + d * C[sym_index(0, j)];
+    B[j] = B[j] - d * C[packed(1, j)];
+    B[3 + j] = B[3 + j] + d * C[packed(0, j)];
   }
   A[0] = A[0] - d * (b01 + B[1]);
   A[1] = A[1] + d * (b00 - B[4]);
@@ -188,10 +168,10 @@ LW_INLINE Matrix6<C> to_matrix(const Compliance<C>& L) {
   for (int i = 0; i < 3; ++i)
 #pragma GCC unroll 3
     for (int j = 0; j < 3; ++j) {
-      out[6 * i + j] = L.A.m[sym_index(i, j)];
+      out[6 * i + j] = L.A.m[packed(i, j)];
       out[6 * i + 3 + j] = L.B.m[3 * i + j];
       out[6 * (3 + j) + i] = L.B.m[3 * i + j];
-      out[6 * (3 + i) + 3 + j] = L.C.m[sym_index(i, j)];
+      out[6 * (3 + i) + 3 + j] = L.C.m[packed(i, j)];
     }
   return out;
 }

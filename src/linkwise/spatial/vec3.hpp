@@ -1,7 +1,7 @@
 #pragma once
 // 3-vectors and 3x3 matrices on any scalar. Mixed products (lanes times model constants held as
 // plain doubles) give the wider type.
-#include "linkwise/base/inline.hpp"
+#include "linkwise/base/packed.hpp"
 
 namespace linkwise {
 
@@ -97,8 +97,6 @@ struct Sym3 {
   S m[6]{};
 };
 
-constexpr int sym_index(int i, int j) { return i >= j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i; }
-
 template <class A, class B>
 LW_INLINE Vec3<Wider<A, B>> operator*(const Sym3<A>& a, const Vec3<B>& v) {
   return {a.m[0] * v.x + a.m[1] * v.y + a.m[3] * v.z, a.m[1] * v.x + a.m[2] * v.y + a.m[4] * v.z,
@@ -113,14 +111,14 @@ LW_INLINE Sym3<Wider<A, B>> congruence(const Mat3<A>& R, const Sym3<B>& S) {
   for (int i = 0; i < 3; ++i)
 #pragma GCC unroll 3
     for (int j = 0; j < 3; ++j)
-      t.m[3 * i + j] = S.m[sym_index(i, 0)] * R.m[j] + S.m[sym_index(i, 1)] * R.m[3 + j] +
-                       S.m[sym_index(i, 2)] * R.m[6 + j];
+      t.m[3 * i + j] = S.m[packed(i, 0)] * R.m[j] + S.m[packed(i, 1)] * R.m[3 + j] +
+                       S.m[packed(i, 2)] * R.m[6 + j];
   Sym3<Wider<A, B>> y;
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i)
 #pragma GCC unroll 3
     for (int j = 0; j <= i; ++j)
-      y.m[sym_index(i, j)] = R.m[i] * t.m[j] + R.m[3 + i] * t.m[3 + j] + R.m[6 + i] * t.m[6 + j];
+      y.m[packed(i, j)] = R.m[i] * t.m[j] + R.m[3 + i] * t.m[3 + j] + R.m[6 + i] * t.m[6 + j];
   return y;
 }
 

@@ -134,7 +134,7 @@ inline Inertia<double> random_inertia(Draws& draws) {
   Inertia<double> M{m, m * c, random_central_inertia(draws, 0.3)};
   const Mat3<double> shift = transpose(tilde(c)) * tilde(c);
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j <= i; ++j) M.I.m[sym_index(i, j)] += m * shift.m[3 * i + j];
+    for (int j = 0; j <= i; ++j) M.I.m[packed(i, j)] += m * shift.m[3 * i + j];
   return M;
 }
 

@@ -2,23 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "linkwise/linear/cholesky_root.hpp"
 #include "linkwise/linear/symmetric_eigen.hpp"
 
 namespace linkwise {
 namespace {
 
-/// Lower R with G = R R^T, n x n; false when G is not positive definite.
-bool cholesky(int n, const Block& g, Block& root) {
-  root.fill(0.0);
-  for (int j = 0; j < n; ++j)
-    for (int i = j; i < n; ++i) {
-      double sum = 0.5 * (g[6 * i + j] + g[6 * j + i]);
-      for (int k = 0; k < j; ++k) sum -= root[6 * i + k] * root[6 * j + k];
-      if (i == j && !(sum > 0.0)) return false;
-      root[6 * i + j] = i == j ? std::sqrt(sum) : sum / root[7 * j];
-    }
-  return true;
+/// Of the symmetric part; false when it is not positive definite.
+bool regular_root(int n, Block& G, Block& R) {
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j <= i; ++j) G[6 * i + j] = 0.5 * (G[6 * i + j] + G[6 * j + i]);
+  return cholesky_root(n, G, std::numeric_limits<double>::min(), 0.0, R);
 }
 
 /// R^-T u, R lower: the force whose response has unit energy along u.
@@ -122,7 +118,7 @@ void CoarseSpace::select(const BlockTree& A, const Cut& cut, double threshold) {
     for (int k = 0; k < rows; ++k) inner[6 * r + k] = root_responses_[k][A.offset[cut.root] + r];
   for (int r = 0; r < cols; ++r)
     for (int k = 0; k < cols; ++k) outer[6 * r + k] = tail_responses_[k][A.offset[cut.tail] + r];
-  if (!cholesky(rows, inner, root_factor) || !cholesky(cols, outer, tail_factor)) return;
+  if (!regular_root(rows, inner, root_factor) || !regular_root(cols, outer, tail_factor)) return;
   const Block& coupling = A.parent_block[cut.root];
   for (int r = 0; r < rows; ++r)
     for (int k = 0; k < cols; ++k)
