@@ -1,45 +1,48 @@
 #include "linkwise/simulate/body_velocity_state.hpp"
 
+#include <algorithm>
+
 namespace linkwise {
 
-Simulation::BodyVelocityState::BodyVelocityState(Simulation& owner)
-    : owner_(owner),
-      velocities_(owner.setup_->driven(), owner.setup_->options.dynamics),
+BodyVelocityState::BodyVelocityState(const Model& model, const DynamicsOptions& options, Host host)
+    : model_(model),
+      host_(std::move(host)),
+      velocities_(model, options),
       y_(size()),
-      rates_(owner.nv()) {}
+      rates_(model.nv()) {}
 
-const std::vector<double>& Simulation::BodyVelocityState::start() {
-  const double* q = owner_.y_.data();
-  std::copy_n(q, owner_.nq(), y_.begin());
-  velocities_.from_rates(q, q + owner_.nq(), y_.data() + owner_.nq());
+const std::vector<double>& BodyVelocityState::from_rates(const std::vector<double>& state) {
+  const double* q = state.data();
+  std::copy_n(q, model_.nq(), y_.begin());
+  velocities_.from_rates(q, q + model_.nq(), y_.data() + model_.nq());
   return y_;
 }
 
-double Simulation::BodyVelocityState::interpolate(double t) {
-  owner_.integrator_->interpolate(t, y_);
-  const double *q = y_.data(), *w = q + owner_.nq();
-  std::copy_n(q, owner_.nq(), owner_.y_.begin());
-  velocities_.to_rates(q, w, owner_.y_.data() + owner_.nq());
+double BodyVelocityState::interpolate(Integrator& integrator, double t,
+                                      std::vector<double>& state) {
+  integrator.interpolate(t, y_);
+  const double *q = y_.data(), *w = q + model_.nq();
+  std::copy_n(q, model_.nq(), state.begin());
+  velocities_.to_rates(q, w, state.data() + model_.nq());
   return velocities_.drift(q, w);
 }
 
-Outcome Simulation::BodyVelocityState::evaluate(double t, const double* y, double* ydot) {
-  const double* w = y + owner_.nq();
-  double* dw = ydot + owner_.nq();
+Outcome BodyVelocityState::evaluate(double t, const double* y, double* ydot) {
+  const double* w = y + model_.nq();
+  double* dw = ydot + model_.nq();
   position_rates(y, w, ydot);
-  const SweepInput<double> in = owner_.input(t, y, rates_.data());
-  const auto evaluation = [&] { return velocities_.evaluate(t, in, w, dw); };
-  const DynamicsReport report = owner_.keeps_trace_ ? owner_.traced(t, evaluation) : evaluation();
-  return owner_.judge(t, report, dw, velocities_.size());
+  const SweepInput<double> in = host_.input(t, y, rates_.data());
+  return host_.judge(
+      t, [&] { return velocities_.evaluate(t, in, w, dw); }, dw, velocities_.size());
 }
 
-void Simulation::BodyVelocityState::position_rates(const double* q, const double* w, double* qdot) {
+void BodyVelocityState::position_rates(const double* q, const double* w, double* qdot) {
   velocities_.to_rates(q, w, rates_.data());
-  owner_.position_rates(q, rates_.data(), qdot);
+  for (const Element& e : model_.elements) element_position_rate(e, q, rates_.data(), qdot);
 }
 
-void Simulation::BodyVelocityState::accepted(double t, const double*) {
-  if (!owner_.trace_.empty()) owner_.trace_.back().accepted = true;
+void BodyVelocityState::accepted(double t, const double*) {
+  host_.accepted();
   velocities_.accepted(t);
 }
 

@@ -49,12 +49,19 @@ void Simulation::start(double t0, const Start& start) {
   body_velocities_.reset();
   OdeSystem* system = this;
   if (setup_->options.state == StateChoice::body_velocities) {
-    body_velocities_ = std::make_unique<BodyVelocityState>(*this);
+    body_velocities_ = std::make_unique<BodyVelocityState>(
+        setup_->driven(), setup_->options.dynamics,
+        BodyVelocityState::Host{
+            [this](double t, const double* q, const double* u) { return input(t, q, u); },
+            [this](double t, const auto& evaluation, const double* dw, int n) {
+              return judge(t, keeps_trace_ ? traced(t, evaluation) : evaluation(), dw, n);
+            },
+            [this] { mark_accepted(); }});
     system = body_velocities_.get();
   }
   integrator_ = make_integrator(setup_->options.integrator, *system, setup_->options.integration);
   start_.assign(y_.begin(), y_.begin() + position_size());
-  if (body_velocities_) return integrator_->start(t0, body_velocities_->start());
+  if (body_velocities_) return integrator_->start(t0, body_velocities_->from_rates(y_));
   std::vector<double> y = y_;
   for (size_t i = 0; i < members_; ++i)
     parent_axes_.from_child(y.data() + i * nq(), rates_in(y.data()) + i * nv());
@@ -234,8 +241,12 @@ void Simulation::normalise(double* y) {
   for (size_t i = 0; i < members_; ++i) normalise_quaternions(model(), y + i * nq());
 }
 
-void Simulation::accepted(double t, const double* y) {
+void Simulation::mark_accepted() {
   if (!trace_.empty()) trace_.back().accepted = true;
+}
+
+void Simulation::accepted(double t, const double* y) {
+  mark_accepted();
   if (solver_tolerance_) solver_tolerance_->accepted(t, y, rates_in(y));
   if (method_) method_->accepted(t);
 }
@@ -321,7 +332,7 @@ bool Simulation::reach(double t) {
 bool Simulation::advance(double t, const Sample& sample) {
   if (!reach(t)) return false;
   if (body_velocities_)
-    drift_ = body_velocities_->interpolate(t);
+    drift_ = body_velocities_->interpolate(*integrator_, t, y_);
   else {
     integrator_->interpolate(t, y_);
     to_state(y_.data());

@@ -30,6 +30,8 @@ struct Start {
   size_t members = 1;
 };
 
+class BodyVelocityState;
+
 class Simulation : private OdeSystem {
  public:
   Simulation(std::shared_ptr<const Model> model, SimulationOptions options);
@@ -68,8 +70,6 @@ class Simulation : private OdeSystem {
   const std::shared_ptr<Setup>& shared_setup() const { return setup_; }
 
  private:
-  struct BodyVelocityState;
-
   size_t nq() const { return setup_->model->nq(); }
   size_t nv() const { return setup_->model->nv(); }
   size_t n_load() const { return 6 * static_cast<size_t>(setup_->model->n_joints()); }
@@ -95,6 +95,7 @@ class Simulation : private OdeSystem {
   Outcome on_lanes(double t, const double* y, double* du, double* loads);
   DynamicsReport traced(double t, const std::function<DynamicsReport()>& evaluation);
   Outcome judge(double t, const DynamicsReport& report, const double* du, int n);
+  void mark_accepted();
   Ending failure(size_t member, double t, Outcome outcome, int body, const double* du) const;
 
   void to_state(double* y) const;
