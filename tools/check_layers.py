@@ -46,7 +46,7 @@ LAYERS = {
     "kinematics": MODEL,
     "forces": MOTION,
     "constraint": MOTION | {"exec", "linear", "forces"},
-    "recursion": MOTION | {"exec"},
+    "recursion": MOTION | {"exec", "linear", "constraint"},
     "dynamics": NUMERICS | MECHANICS | {"recursion"},
     "integrate": BASE | {"exec"},
     "simulate": NUMERICS | MECHANICS | {"recursion", "dynamics", "integrate"},

@@ -50,7 +50,7 @@ class ArticulatedBody {
     sweeps_.store_loads(in.q, loads);
   }
 
-  int failed_body() const { return sweeps_.failed_body; }
+  int failed_body() const { return sweeps_.failed_body(); }
 
   /// From now on threads share the branches of a large tree. They influence no result.
   void share_branches(Executor executor) {
@@ -58,12 +58,12 @@ class ArticulatedBody {
     executor_ = executor;
     if (!branches_->any()) return;
     for (const KindRange& range : branches_->trunk)
-      for (int n = range.begin; n < range.end; ++n) sweeps_.receiver[n].opens = false;
+      for (int n = range.begin; n < range.end; ++n) sweeps_.add_to_opened(n);
     for (const auto& share : branches_->shares)
       for (const int root : share.roots)
         if (model_->topology[root].parent >= 0) roots_.push_back(root);
     from_root_.resize(roots_.size());
-    for (size_t i = 0; i < roots_.size(); ++i) sweeps_.receiver[roots_[i]] = {&from_root_[i], true};
+    for (size_t i = 0; i < roots_.size(); ++i) sweeps_.send_to(roots_[i], &from_root_[i]);
   }
 
  private:
@@ -79,10 +79,9 @@ class ArticulatedBody {
     sweeps_.add_external(in);
     for (auto& contribution : from_root_) contribution.p = {};
     each([&](const auto& ranges) { sweeps_.eliminate_joints(in, ranges, with_loads); });
-    for (const KindRange& range : trunk)
-      for (int n = range.begin; n < range.end; ++n) sweeps_.body[n].sum.Y = {};
+    sweeps_.clear_inertias(trunk);
     for (size_t i = 0; i < roots_.size(); ++i)
-      sweeps_.body[model_->topology[roots_[i]].parent].sum += from_root_[i];
+      sweeps_.receive(model_->topology[roots_[i]].parent, from_root_[i]);
     sweeps_.eliminate_joints(in, trunk, with_loads);
     sweeps_.accelerate_bodies(in, trunk, du, with_loads);
     each([&](const auto& ranges) { sweeps_.accelerate_bodies(in, ranges, du, with_loads); });

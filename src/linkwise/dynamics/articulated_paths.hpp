@@ -30,12 +30,7 @@ class ArticulatedPaths {
     for (int begin = -idle; begin < n_paths; begin += lanes) add_group(begin, place);
     for (int i = 0; i < n_paths; ++i) connect(i, place);
     connect_others(place);
-    for (Group& group : groups_) {
-      const auto outermost = [](const auto& a, const auto& b) { return a.position < b.position; };
-      std::stable_sort(group.roots.begin(), group.roots.end(), outermost);
-      std::stable_sort(group.branches.begin(), group.branches.end(), outermost);
-      std::stable_sort(group.outer_parents.begin(), group.outer_parents.end(), outermost);
-    }
+    for (Group& group : groups_) group.sort();
     order_groups();
   }
 
@@ -50,13 +45,13 @@ class ArticulatedPaths {
     if (loads) {
       for (Group& group : groups_)
         group.for_bodies(
-            [&](int k, int l, int n) { others_.reduced[n].joint_load = group.joint_load(k, l); });
+            [&](int k, int l, int n) { others_.set_joint_load(n, group.joint_load(k, l)); });
       others_.store_loads(in.q, loads);
     }
     return failed_body() < 0;
   }
 
-  int failed_body() const { return others_.failed_body; }
+  int failed_body() const { return others_.failed_body(); }
 
  private:
   using Group = PathGroup<S>;
@@ -79,7 +74,7 @@ class ArticulatedPaths {
     const PathPlace parent = path.parent < 0 ? PathPlace{} : place[path.parent];
     groups_[root.group].add_root({root.position, root.lane, path.parent, parent});
     if (parent.group >= 0)
-      groups_[parent.group].branches.push_back({parent.position, parent.lane, root});
+      groups_[parent.group].add_branch({parent.position, parent.lane, root});
     else if (path.parent >= 0)
       on_trunk_.push_back({path.parent, root});
   }
@@ -87,15 +82,15 @@ class ArticulatedPaths {
   /// Sums of the trunk are opened by the paths; those of path bodies are cleared in add_to_paths().
   void connect_others(const std::vector<PathPlace>& place) {
     for (const KindRange& range : paths_.trunk)
-      for (int n = range.begin; n < range.end; ++n) others_.receiver[n].opens = false;
+      for (int n = range.begin; n < range.end; ++n) others_.add_to_opened(n);
     std::vector<char> listed(model_->n_bodies(), 0);
     for (int n = 0; n < model_->n_bodies(); ++n) {
       const int parent = model_->topology[n].parent;
       if (place[n].group >= 0 || parent < 0 || place[parent].group < 0) continue;
-      others_.receiver[n].opens = false;
+      others_.add_to_opened(n);
       if (std::exchange(listed[parent], 1)) continue;
       const PathPlace& at = place[parent];
-      groups_[at.group].outer_parents.push_back({at.position, at.lane, parent});
+      groups_[at.group].add_outer_parent({at.position, at.lane, parent});
     }
   }
 
@@ -103,7 +98,7 @@ class ArticulatedPaths {
   void order_groups() {
     std::vector<int> round(groups_.size(), 0);
     for (size_t g = 0; g < groups_.size(); ++g) {
-      for (const auto& branch : groups_[g].branches)
+      for (const auto& branch : groups_[g].branches())
         if (branch.root.group != static_cast<int>(g))
           round[g] = std::max(round[g], round[branch.root.group] + 1);
       if (rounds_.size() <= static_cast<size_t>(round[g])) rounds_.resize(round[g] + 1);
@@ -139,12 +134,12 @@ class ArticulatedPaths {
       group.calc_velocities(in, [&](const auto& root) {
         if (const PathPlace& at = root.place; at.group >= 0)
           return groups_[at.group].velocity(at.position, at.lane);
-        return root.parent >= 0 ? others_.body[root.parent].velocity : Motion<double>{};
+        return root.parent >= 0 ? others_.velocity(root.parent) : Motion<double>{};
       });
     });
     for (Group& group : groups_)
-      for (const auto& at : group.outer_parents)
-        others_.body[at.body].velocity = group.velocity(at.position, at.lane);
+      for (const auto& at : group.outer_parents())
+        others_.set_velocity(at.body, group.velocity(at.position, at.lane));
     others_.calc_velocities(in, paths_.outer);
   }
 
@@ -157,33 +152,30 @@ class ArticulatedPaths {
         if (in.external)
           group.for_bodies([&](int k, int l, int n) { f(group, k, l, n); });
         else
-          for (const auto& at : group.outer_parents) f(group, at.position, at.lane, at.body);
+          for (const auto& at : group.outer_parents()) f(group, at.position, at.lane, at.body);
     };
-    for_receivers([&](Group&, int, int, int n) { others_.body[n].sum = {}; });
+    for_receivers([&](Group&, int, int, int n) { others_.clear(n); });
     others_.add_external(in);
     others_.eliminate_joints(in, paths_.outer, with_loads);
     for_receivers(
-        [&](Group& group, int k, int l, int n) { group.add_wrench(k, l, others_.body[n].sum.p); });
+        [&](Group& group, int k, int l, int n) { group.add_wrench(k, l, others_.sum(n).p); });
   }
 
   void eliminate_paths(bool with_loads) {
     for (size_t r = 0; r < rounds_.size(); ++r)
       in_round(r, [&](Group& group) {
         const auto of = [&](const PathPlace& at) -> const Group& { return groups_[at.group]; };
-        const auto outer = [&](const auto& at) -> const auto& {
-          return others_.body[at.body].sum.Y;
-        };
+        const auto outer = [&](const auto& at) -> const auto& { return others_.sum(at.body).Y; };
         const int failed = group.eliminate_joints(of, outer, with_loads);
         if (failed >= 0) others_.fail(failed);
       });
   }
 
   void eliminate_trunk(const SweepInput<double>& in, bool with_loads) {
-    for (const KindRange& range : paths_.trunk)
-      for (int n = range.begin; n < range.end; ++n) others_.body[n].sum.Y = {};
+    others_.clear_inertias(paths_.trunk);
     for (const auto& [parent, root] : on_trunk_) {
       const Contribution<S>& of_lanes = groups_[root.group].from_roots_at(root.position);
-      others_.body[parent].sum += get_lanes<Contribution<double>, S>(of_lanes, root.lane);
+      others_.receive(parent, get_lanes<Contribution<double>, S>(of_lanes, root.lane));
     }
     others_.eliminate_joints(in, paths_.trunk, with_loads);
   }
@@ -195,13 +187,13 @@ class ArticulatedPaths {
       const auto parent = [&](const auto& root) {
         if (const PathPlace& at = root.place; at.group >= 0)
           return groups_[at.group].acceleration(at.position, at.lane);
-        return root.parent >= 0 ? others_.body[root.parent].acceleration : ground;
+        return root.parent >= 0 ? others_.acceleration(root.parent) : ground;
       };
       group.accelerate_bodies(parent, du, with_loads);
     });
     for (Group& group : groups_)
-      for (const auto& at : group.outer_parents)
-        others_.body[at.body].acceleration = group.acceleration(at.position, at.lane);
+      for (const auto& at : group.outer_parents())
+        others_.set_acceleration(at.body, group.acceleration(at.position, at.lane));
     others_.accelerate_bodies(in, paths_.outer, du, with_loads);
   }
 

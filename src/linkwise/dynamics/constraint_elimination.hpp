@@ -2,6 +2,9 @@
 // The constraint-force system A f = b of [sharf1993] assembled and eliminated in one sweep from tip
 // to base: block Cholesky whose blocks never leave the registers, on scalars or lanes.
 //
+// This file has the order of the sweep and what is kept of every body;
+// recursion/constraint_steps.hpp says what is done with one.
+//
 // A body answers a wrench r of its inboard joint, all its outboard joints eliminated, with
 //     a_n = Phi_n r + alpha_n.
 // Joint n on parent p, which answers with Phi' and alpha' before n is eliminated, has the rows
@@ -11,16 +14,13 @@
 //     Phi_p = Phi' - Z^T D^-1 Z,    alpha_p = alpha' - Z^T D^-1 L^-1 b.
 // For the first joint on a body Phi' is its inverse inertia, so that for a joint of one axis X Phi'
 // and X Phi' X^T are constants of the model in the frame before its motion. There B is a selection
-// (axis_constraint.hpp), so that nothing but Phi_n has to be moved. A system once eliminated is
+// so that nothing but Phi_n has to be moved. A system once eliminated is
 // solved again for other right-hand sides at a fraction of the cost.
 #include <limits>
-#include <memory>
-#include <type_traits>
 #include <vector>
 
-#include "linkwise/dynamics/axis_constraint.hpp"
-#include "linkwise/dynamics/general_elimination.hpp"
 #include "linkwise/dynamics/refinement.hpp"
+#include "linkwise/recursion/constraint_stack_steps.hpp"
 
 namespace linkwise {
 
@@ -31,20 +31,18 @@ class ConstraintElimination {
   explicit ConstraintElimination(const Model& model)
       : model_(&model),
         body_(model.n_bodies()),
+        first_(first_of_siblings(model)),
         across_(model.n_bodies()),
-        general_(model.n_general),
+        stack_(model.n_general),
         refinement_(model) {
     require_regular_inertias(model);
     for (int n = 0; n < model.n_bodies(); ++n)
       compliance_.push_back(compliance(model.constants[n].inertia));
-    for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
+    for_bodies_base_to_tip(model.kind_ranges, [&](auto joint, int n) {
       using J = decltype(joint);
       if constexpr (!is_general<J>)
-        for (int n = begin; n < end; ++n) {
-          const BodyTopology& body = model.topology[n];
-          if (body.parent >= 0 && body.first_to_give)
-            calc_across<J>(model.constants[n], compliance_[body.parent], across_[n]);
-        }
+        if (first_[n])
+          calc_across<J>(model.constants[n], compliance_[model.topology[n].parent], across_[n]);
     });
   }
 
@@ -74,32 +72,19 @@ class ConstraintElimination {
 
  private:
   struct BodyWork {
-    Motion<S> v;      ///< velocity, then acceleration
-    Force<S> g;       ///< wrenches other than the joints' unknown ones
-    Motion<S> alpha;  ///< answer to no wrench
-    Force<S> r;       ///< unknown wrench of the inboard joint, less those of outboard joints so far
-    Force<S> load;    ///< wrench of the inboard joint
-    Motion<S> along;  ///< Phi_n's column of the drive's direction
-    AxisPose<S> at;
+    Motion<S> v, a;     ///< velocity, acceleration
+    Force<S> g;         ///< wrenches other than the joints' unknown ones
+    Motion<S> alpha;    ///< answer to no wrench
+    Compliance<S> Phi;  ///< answer to a wrench of the inboard joint, outboard joints eliminated
+    Force<S> r;         ///< unknown wrench of the inboard joint, less those of outboard ones so far
+    Force<S> load;      ///< wrench of the inboard joint
+    ConstrainedAxis<S> axis;
     JointElimination<S> joint;  ///< the inboard one
   };
 
-  const std::vector<double>& armature() const { return model_->dof_values(DofProperty::armature); }
-
-  /// f(rows), the number as a constant: five, or six where a joint drives through its rotor.
-  template <class J, class F>
-  LW_INLINE static void with_rows(const BodyConstants<double>& k, F&& f) {
-    using Five = std::integral_constant<int, 5>;
-    using Six = std::integral_constant<int, 6>;
-    if constexpr (J::leaves_zero_row)
-      f(Five{});
-    else if constexpr (!J::slides)
-      f(Six{});
-    else if (k.armature > 0)
-      f(Six{});
-    else
-      f(Five{});
-  }
+  const double* armature() const { return model_->dof_values(DofProperty::armature).data(); }
+  /// Own answer of a body without outboard joints.
+  Compliance<S> own(int n) const { return widen<S>(compliance_[n]); }
 
   /// `again`: of a system already eliminated.
   template <bool again>
@@ -123,201 +108,149 @@ class ConstraintElimination {
   template <bool again>
   void calc_velocities(const SweepInput<S>& in) {
     const Model& model = *model_;
-    const Motion<S> resting{};
-    for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
+    const auto velocity_of = [&](int n) -> const Motion<S>& { return body_[n].v; };
+    const auto step = [&](auto joint, int n, const Motion<S>& v_parent) {
       using J = decltype(joint);
-      for (int n = begin; n < end; ++n) {
-        const BodyTopology& body = model.topology[n];
-        const BodyConstants<double>& k = model.constants[n];
-        BodyWork& w = body_[n];
-        const Motion<S>& v_parent = body.parent >= 0 ? body_[body.parent].v : resting;
-        if constexpr (is_general<J>) {
-          general_[body.general].calc_state(model, body, in, v_parent, again, w.v);
-        } else {
-          if constexpr (!again) calc_axis_pose<J>(k, in.q[body.q], w.at);
-          store(w.v, outward_velocity<J>(MovedAxis<J, S>{k, w.at}, v_parent, k.pitch,
-                                         in.v ? in.v[body.v] : S{}));
-        }
-        const Force<S> h = momentum_bias(k.inertia, w.v);
-        w.g = {-h.lin, -h.ang};
-        if constexpr (is_general<J>)
-          general_[body.general].add_drives(armature(), in.tau, w.g,
-                                            body.parent >= 0 ? &body_[body.parent].g : nullptr);
-        else
-          with_rows<J>(k, [&](auto rows) {
-            if constexpr (rows == 5) add_drive<J>(in.tau[body.v], n, body);
-          });
+      const BodyTopology& body = model.topology[n];
+      const BodyConstants<double>& k = model.constants[n];
+      BodyWork& w = body_[n];
+      Force<S>* const g_parent = body.parent >= 0 ? &body_[body.parent].g : nullptr;
+      if constexpr (is_general<J>) {
+        stack_[body.general].calc_state(model, body, in, v_parent, again, w.v);
+      } else {
+        if constexpr (!again) calc_axis_pose<J>(k, in.q[body.q], w.axis.at);
+        store(w.v, outward_velocity<J>(MovedAxis<J, S>{k, w.axis.at}, v_parent, k.pitch,
+                                       in.v ? in.v[body.v] : S{}));
       }
-    });
-    if (in.external)
-      for (int j = 0; j < model.n_joints(); ++j)
-        if (model.joints[j].last_of_body)
-          body_[model.joints[j].body].g += user_wrench(in.external, model.joints[j], j);
-  }
-
-  /// A drive without rotor: a plain torque or force on z, which the joint's motion leaves alone.
-  template <class J>
-  LW_INLINE void add_drive(const S& tau, int n, const BodyTopology& body) {
-    const auto& tree = model_->constants[n].tree;
-    const auto& R = tree.R.m;
-    const Vec3<S> on_parent{R[6] * tau, R[7] * tau, R[8] * tau};
-    Force<S>& g = body_[n].g;
-    if constexpr (J::turns) {
-      g.ang.z += tau;
-      if (body.parent >= 0) body_[body.parent].g.ang -= on_parent;
-    } else {
-      g.lin.z += tau;
-      if (body.parent >= 0) body_[body.parent].g -= Force<S>{on_parent, cross(tree.r, on_parent)};
-    }
+      const Force<S> h = momentum_bias(k.inertia, w.v);
+      w.g = {-h.lin, -h.ang};
+      if constexpr (is_general<J>)
+        stack_[body.general].add_drives(armature(), in.tau, w.g, g_parent);
+      else
+        with_rows<J>(k, [&](auto rows) {
+          if constexpr (rows == 5) add_drive<J>(k.tree, in.tau[body.v], w.g, g_parent);
+        });
+    };
+    sweep_outward(model, model.kind_ranges, Motion<S>{}, velocity_of, step);
+    for_external_wrenches(model, in, [&](int n, const Force<S>& w) { body_[n].g += w; });
   }
 
   template <bool again>
   void tip_to_base(const SweepInput<S>& in) {
     const Model& model = *model_;
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
-    for_kind_ranges_tip_to_base(model, [&](auto joint, int begin, int end) {
+    for_bodies_tip_to_base(model.kind_ranges, [&](auto joint, int n) {
       using J = decltype(joint);
-      for (int n = end - 1; n >= begin; --n) {
-        const BodyTopology& body = model.topology[n];
-        BodyWork& w = body_[n];
-        if (body.n_children == 0) w.alpha = compliance_[n] * w.g;
-        if (body.first_to_give)
-          body_[body.parent].alpha = compliance_[body.parent] * body_[body.parent].g;
-        const Motion<S>& a_parent = body.parent >= 0 ? body_[body.parent].alpha : ground;
-        if constexpr (is_general<J>)
-          eliminate_general<again>(in, n, body, a_parent);
-        else
-          with_rows<J>(model.constants[n],
-                       [&](auto rows) { eliminate_axis<J, rows, again>(in, n, body, a_parent); });
-      }
-    });
-  }
-
-  template <class J, int rows, bool again>
-  LW_INLINE void eliminate_axis(const SweepInput<S>& in, int n, const BodyTopology& body,
-                                const Motion<S>& a_parent) {
-    BodyWork& w = body_[n];
-    const BodyConstants<double>& k = model_->constants[n];
-    Motion<S> gap = w.alpha;
-    gap += J::bias(w.v, k.pitch, in.v ? S(-in.v[body.v]) : S{});
-    undo_motion<J>(w.at, gap);
-    const Motion<S> carried = before_motion<J>(k, a_parent);
-    S b[6];
-    to_components<J>(Motion<S>{carried.lin - gap.lin, carried.ang - gap.ang}, k.pitch, b);
-    if constexpr (rows == 6) b[5] = b[5] + in.tau[body.v] / k.armature;
-    if constexpr (!again) {
-      Compliance<S> Phi = body.n_children > 0 ? widen<S>(w.joint.Phi) : widen<S>(compliance_[n]);
-      w.along = column(Phi, J::turns ? 5 : 2);
-      undo_motion<J>(w.at, Phi);
-      S D[21];
-      to_components<J, rows>(Phi, k.pitch, D);
-      if constexpr (rows == 6) D[20] = D[20] + 1 / k.armature;
-      if (body.parent < 0) {
-        check(w.joint.template eliminate_root<rows>(D), n);
-      } else if (body.first_to_give) {
-        check(w.joint.template eliminate<rows>(D, across_[n], compliance_[body.parent],
-                                               body_[body.parent].joint.Phi),
-              n);
+      const BodyTopology& body = model.topology[n];
+      BodyWork& w = body_[n];
+      if (body.n_children == 0) w.alpha = compliance_[n] * w.g;
+      if (first_[n]) body_[body.parent].alpha = compliance_[body.parent] * body_[body.parent].g;
+      const Motion<S>& a_parent = body.parent >= 0 ? body_[body.parent].alpha : ground;
+      const auto reduce = [&](auto rows, const S* b) {
+        const Motion<S> taken = w.joint.template reduce<rows>(b);
+        if (body.parent >= 0) body_[body.parent].alpha += Motion<S>{-taken.lin, -taken.ang};
+      };
+      S b[6];
+      if constexpr (is_general<J>) {
+        stack_[body.general].calc_gap(armature(), in.tau, a_parent, w.alpha, b);
+        if constexpr (!again) eliminate_stack(n, body);
+        reduce(std::integral_constant<int, 6>{}, b);
       } else {
-        Across<S> across;
-        calc_across<J>(k, body_[body.parent].joint.Phi, across);
-        check(w.joint.template eliminate<rows>(D, across, body_[body.parent].joint.Phi,
-                                               body_[body.parent].joint.Phi),
-              n);
-      }
-    }
-    const Motion<S> taken = w.joint.template reduce<rows>(b);
-    if (body.parent >= 0) body_[body.parent].alpha += Motion<S>{-taken.lin, -taken.ang};
-  }
-
-  template <bool again>
-  void eliminate_general(const SweepInput<S>& in, int n, const BodyTopology& body,
-                         const Motion<S>& a_parent) {
-    BodyWork& w = body_[n];
-    GeneralElimination<S>& general = general_[body.general];
-    S b[6];
-    general.calc_gap(armature(), in.tau, a_parent, w.alpha, b);
-    if constexpr (!again) {
-      S D[21];
-      Across<S> across;
-      Compliance<S> before{};
-      if (body.parent >= 0)
-        before =
-            body.first_to_give ? widen<S>(compliance_[body.parent]) : body_[body.parent].joint.Phi;
-      general.assemble(body.n_children > 0 ? w.joint.Phi : widen<S>(compliance_[n]), before, D,
-                       across);
-      if (body.parent >= 0)
-        check(w.joint.template eliminate<6>(D, across, before, body_[body.parent].joint.Phi), n);
-      else
-        check(w.joint.template eliminate_root<6>(D), n);
-    }
-    const Motion<S> taken = w.joint.template reduce<6>(b);
-    if (body.parent >= 0) body_[body.parent].alpha += Motion<S>{-taken.lin, -taken.ang};
-  }
-
-  void base_to_tip(const SweepInput<S>& in, S* du) {
-    const Model& model = *model_;
-    const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
-    for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
-      using J = decltype(joint);
-      for (int n = begin; n < end; ++n) {
-        const BodyTopology& body = model.topology[n];
-        const Motion<S>& a_parent = body.parent >= 0 ? body_[body.parent].v : ground;
-        if constexpr (is_general<J>)
-          accelerate_general(in, n, body, a_parent, du);
-        else
-          with_rows<J>(model.constants[n],
-                       [&](auto rows) { accelerate_axis<J, rows>(in, n, body, a_parent, du); });
+        const BodyConstants<double>& k = model.constants[n];
+        with_rows<J>(k, [&](auto rows) {
+          calc_gap<J, rows>(k, w.axis.at, a_parent, w.alpha, w.v, in.v ? in.v[body.v] : S{},
+                            in.tau[body.v], b);
+          if constexpr (!again) eliminate_axis<J, rows>(n, body);
+          reduce(rows, b);
+        });
       }
     });
   }
 
   template <class J, int rows>
+  LW_INLINE void eliminate_axis(int n, const BodyTopology& body) {
+    BodyWork& w = body_[n];
+    const BodyConstants<double>& k = model_->constants[n];
+    S D[21];
+    assemble<J, rows>(k, body.n_children > 0 ? w.Phi : own(n), w.axis, D);
+    if (body.parent < 0) {
+      check(w.joint.template eliminate_root<rows>(D), n);
+    } else if (BodyWork& parent = body_[body.parent]; first_[n]) {
+      check(w.joint.template eliminate<rows>(D, across_[n], compliance_[body.parent], parent.Phi),
+            n);
+    } else {
+      Across<S> across;
+      calc_across<J>(k, parent.Phi, across);
+      check(w.joint.template eliminate<rows>(D, across, parent.Phi, parent.Phi), n);
+    }
+  }
+
+  void eliminate_stack(int n, const BodyTopology& body) {
+    BodyWork& w = body_[n];
+    S D[21];
+    Across<S> across;
+    Compliance<S> before{};
+    if (body.parent >= 0) before = first_[n] ? own(body.parent) : body_[body.parent].Phi;
+    stack_[body.general].assemble(body.n_children > 0 ? w.Phi : own(n), before, D, across);
+    if (body.parent >= 0)
+      check(w.joint.template eliminate<6>(D, across, before, body_[body.parent].Phi), n);
+    else
+      check(w.joint.template eliminate_root<6>(D), n);
+  }
+
+  void base_to_tip(const SweepInput<S>& in, S* du) {
+    const Model& model = *model_;
+    const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
+    const auto acceleration_of = [&](int n) -> const Motion<S>& { return body_[n].a; };
+    const auto step = [&](auto joint, int n, const Motion<S>& a_parent) {
+      using J = decltype(joint);
+      const BodyTopology& body = model.topology[n];
+      if constexpr (is_general<J>)
+        accelerate_stack(in, n, body, a_parent, du);
+      else
+        with_rows<J>(model.constants[n],
+                     [&](auto rows) { accelerate_axis<J, rows>(in, n, body, a_parent, du); });
+    };
+    sweep_outward(model, model.kind_ranges, ground, acceleration_of, step);
+  }
+
+  template <class J, int rows>
   LW_INLINE void accelerate_axis(const SweepInput<S>& in, int n, const BodyTopology& body,
                                  const Motion<S>& a_parent, S* du) {
-    const Force<S> nothing{};
     const BodyConstants<double>& k = model_->constants[n];
     BodyWork& w = body_[n];
-    w.joint.template solve_back<rows>(body.parent >= 0 ? body_[body.parent].r : nothing);
-    Force<S> r = to_wrench<J>(w.joint.f, rows == 6 ? w.joint.f[5] : S{}, k.pitch);
+    w.joint.template solve_back<rows>(body.parent >= 0 ? body_[body.parent].r : Force<S>{});
+    Force<S> r = to_wrench<J, rows>(k, w.joint.f);
     if (body.parent >= 0) body_[body.parent].r -= at_parent<J>(k, r);
-    apply_motion<J>(w.at, r);
-    Motion<S> a = MovedAxis<J, S>{k, w.at}.to_child(a_parent);
-    a += J::bias(w.v, k.pitch, in.v ? in.v[body.v] : S{});
-    const S rate = dot(w.along, r) + rate_of<J>(w.alpha) - rate_of<J>(a);
-    du[body.v] = rate;
-    J::add_rate(a, k.pitch, rate);
-    store(w.v, a);
+    apply_motion<J>(w.axis.at, r);
+    Motion<S> a;
+    du[body.v] = accelerate<J>(k, w.axis, w.alpha, w.v, in.v ? in.v[body.v] : S{}, r, a_parent, a);
+    store(w.a, a);
     store(w.r, r);
     if constexpr (rows == 5) (J::turns ? r.ang.z : r.lin.z) += in.tau[body.v];
     store(w.load, r);
   }
 
-  void accelerate_general(const SweepInput<S>& in, int n, const BodyTopology& body,
-                          const Motion<S>& a_parent, S* du) {
-    const Force<S> nothing{};
+  void accelerate_stack(const SweepInput<S>& in, int n, const BodyTopology& body,
+                        const Motion<S>& a_parent, S* du) {
     BodyWork& w = body_[n];
-    const GeneralElimination<S>& general = general_[body.general];
-    w.joint.template solve_back<6>(body.parent >= 0 ? body_[body.parent].r : nothing);
-    const Force<S> r = general.wrench(w.joint.f);
-    if (body.parent >= 0) body_[body.parent].r -= general.at_parent(r);
-    w.v = general.accelerate(a_parent, w.alpha, r, du);
+    const StackConstraint<S>& stack = stack_[body.general];
+    w.joint.template solve_back<6>(body.parent >= 0 ? body_[body.parent].r : Force<S>{});
+    const Force<S> r = stack.wrench(w.joint.f);
+    if (body.parent >= 0) body_[body.parent].r -= stack.at_parent(r);
+    w.a = stack.accelerate(a_parent, w.alpha, r, du);
     copy_prescribed(*model_, body, in, du);
     w.r = w.load = r;
-    w.load += general.known();
+    w.load += stack.known();
   }
 
-  /// Largest difference of the bodies' accelerations from what their wrenches give, over the
-  /// largest acceleration: what rounding has cost.
+  /// What rounding has cost: how far accelerations are from what the bodies' wrenches give.
   S violation() const {
     S worst{}, largest{};
     for (int n = 0; n < model_->n_bodies(); ++n) {
-      const BodyWork& w = body_[n];
-      Force<S> net = w.g;
-      net += w.r;
-      const Motion<S> a = compliance_[n] * net;
-      const S given[6] = {a.lin.x, a.lin.y, a.lin.z, a.ang.x, a.ang.y, a.ang.z};
-      const S found[6] = {w.v.lin.x, w.v.lin.y, w.v.lin.z, w.v.ang.x, w.v.ang.y, w.v.ang.z};
+      Force<S> net = body_[n].g;
+      net += body_[n].r;
+      const Vector6<S> given = to_array(compliance_[n] * net), found = to_array(body_[n].a);
 #pragma GCC unroll 6
       for (int i = 0; i < 6; ++i) {
         worst = larger(worst, absolute(S(given[i] - found[i])));
@@ -340,30 +273,16 @@ class ConstraintElimination {
     });
   }
 
-  /// In the bases that calc_joint_constraint() chooses.
+  /// out(f) for all unknowns.
   template <class Out>
   void for_forces(Out&& out) const {
-    for_kind_ranges_base_to_tip(*model_, [&](auto joint, int begin, int end) {
+    for_bodies_base_to_tip(model_->kind_ranges, [&](auto joint, int n) {
       using J = decltype(joint);
-      for (int n = begin; n < end; ++n) {
-        const BodyWork& w = body_[n];
-        if constexpr (is_general<J>) {
-          for (int i = 0; i < general_[model_->topology[n].general].rows(); ++i) out(w.joint.f[i]);
-        } else {
-          const BodyConstants<double>& k = model_->constants[n];
-          const Force<S>& r = w.load;
-          if (k.armature > 0) out(J::project(r, k.pitch));
-          out(r.lin.x);
-          out(r.lin.y);
-          if constexpr (!J::slides)
-            out(r.lin.z);
-          else if constexpr (J::turns)
-            out((r.lin.z - k.pitch * r.ang.z) / std::sqrt(1 + k.pitch * k.pitch));
-          out(r.ang.x);
-          out(r.ang.y);
-          if constexpr (!J::turns) out(r.ang.z);
-        }
-      }
+      const BodyWork& w = body_[n];
+      if constexpr (is_general<J>)
+        for (int i = 0; i < stack_[model_->topology[n].general].rows(); ++i) out(w.joint.f[i]);
+      else
+        for_unknowns<J>(model_->constants[n], w.load, out);
     });
   }
 
@@ -375,8 +294,9 @@ class ConstraintElimination {
   const Model* model_;
   std::vector<BodyWork> body_;
   std::vector<Compliance<double>> compliance_;  ///< the bodies' own
-  std::vector<Across<double>> across_;          ///< of each body's first joint of one axis
-  std::vector<GeneralElimination<S>> general_;
+  std::vector<char> first_;                     ///< body: the first to give to its parent
+  std::vector<Across<double>> across_;          ///< of those with a joint of one axis
+  std::vector<StackConstraint<S>> stack_;
   Refinement<S> refinement_;
   int failed_body_ = -1;
 };

@@ -5,7 +5,7 @@
 // w_n is the joint load, so this is also the witness for the loads of every other method.
 #include <vector>
 
-#include "linkwise/kinematics/body_state.hpp"
+#include "linkwise/recursion/stack_steps.hpp"
 
 namespace linkwise {
 
@@ -25,10 +25,11 @@ class InverseDynamics {
     in.prescribed = du;
     calc_body_states(model, in, state_.data(), general_.data());
     base_to_tip(in, du);
-    for (int n = model.n_bodies() - 1; n >= 0; --n)
-      if (const int parent = model.topology[n].parent; parent >= 0)
-        w_[parent] += transpose_times(state_[n].X, w_[n]);
-    if (tau) project(in, du, tau);
+    tip_to_base(in, tau);
+    if (tau && du) {
+      const auto& armature = model.dof_values(DofProperty::armature);
+      for (int i = 0; i < model.nv(); ++i) tau[i] += armature[i] * du[i];
+    }
     if (loads)
       store_joint_loads(
           model, in.q, [&](int n) -> const Force<S>& { return w_[n]; }, loads);
@@ -42,51 +43,36 @@ class InverseDynamics {
   void base_to_tip(const SweepInput<S>& in, const S* du) {
     const Model& model = *model_;
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
-    for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
+    const auto acceleration_of = [&](int n) -> const Motion<S>& { return a_[n]; };
+    const auto step = [&](auto joint, int n, const Motion<S>& a_parent) {
       using J = decltype(joint);
-      for (int n = begin; n < end; ++n) {
-        const BodyTopology& body = model.topology[n];
-        const BodyConstants<double>& k = model.constants[n];
-        const Motion<S>& a_parent = body.parent >= 0 ? a_[body.parent] : ground;
-        Motion<S> a = state_[n].X * a_parent;
-        a += state_[n].c;
-        if constexpr (is_general<J>) {
-          const GeneralState<S>& g = general_[body.general];
-          for (int i = 0; i < g.n; ++i) {
-            const S rate = du ? du[g.dof[i]] : S{};
-            a += Motion<S>{rate * g.P[i].lin, rate * g.P[i].ang};
-          }
-        } else {
-          J::add_rate(a, k.pitch, du ? du[body.v] : S{});
-        }
-        a_[n] = a;
-        w_[n] = momentum(k.inertia, a);
-        w_[n] += state_[n].bias;
-      }
-    });
+      const BodyTopology& body = model.topology[n];
+      const BodyConstants<double>& k = model.constants[n];
+      Motion<S> a = state_[n].X * a_parent;
+      a += state_[n].c;
+      if constexpr (!is_general<J>)
+        J::add_rate(a, k.pitch, du ? du[body.v] : S{});
+      else if (du)
+        add_rates(general_[body.general], du, a);
+      a_[n] = a;
+      w_[n] = {};
+      inward_load(k.inertia, a, state_[n].bias, w_[n]);
+    };
+    sweep_outward(model, model.kind_ranges, ground, acceleration_of, step);
   }
 
-  void project(const SweepInput<S>& in, const S* du, S* tau) {
+  void tip_to_base(const SweepInput<S>& in, S* tau) {
     const Model& model = *model_;
-    for_kind_ranges_base_to_tip(model, [&](auto joint, int begin, int end) {
+    for_bodies_tip_to_base(model.kind_ranges, [&](auto joint, int n) {
       using J = decltype(joint);
-      for (int n = begin; n < end; ++n) {
-        const BodyTopology& body = model.topology[n];
-        if constexpr (is_general<J>) {
-          Force<S> w = w_[n];
-          for (int i = body.n_elements - 1; i >= 0; --i) {
-            const Element& e = model.elements[body.first_element + i];
-            for (int k = 0; k < e.nv; ++k) tau[e.v + k] = dot(element_column<S>(e, k), w);
-            if (i > 0) w = transpose_times(element_pose(e, in.q), w);
-          }
-        } else {
-          tau[body.v] = J::project(w_[n], model.constants[n].pitch);
-        }
+      const BodyTopology& body = model.topology[n];
+      if constexpr (is_general<J>) {
+        if (tau) project_on_elements(model, body, in.q, w_[n], tau);
+      } else {
+        if (tau) tau[body.v] = J::project(w_[n], model.constants[n].pitch);
       }
+      if (body.parent >= 0) w_[body.parent] += transpose_times(state_[n].X, w_[n]);
     });
-    if (!du) return;
-    const auto& armature = model.dof_values(DofProperty::armature);
-    for (int i = 0; i < model.nv(); ++i) tau[i] += armature[i] * du[i];
   }
 
   const Model* model_;

@@ -27,13 +27,23 @@ Matrix6<double> transform_to_child(const Transform<double>& X, const Matrix6<dou
   return half(half(W));
 }
 
+/// (H^-1)_kk of a column; W of what carries it becomes W of what it carries.
+double let_move(const EliminatedAxis<double>& axis, const Motion<double>& P, Matrix6<double>& W) {
+  const Force<double> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};
+  const Motion<double> given = W * V;
+  const double mobility = axis.D_inverse + dot(given, V);
+  const Vector6<double> p = to_array(P), g = to_array(given);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) W[6 * i + j] += mobility * p[i] * p[j] - p[i] * g[j] - g[i] * p[j];
+  return mobility;
+}
+
 }  // namespace
 
 Mobility::Mobility(const Model& model)
     : model_(&model),
       columns_(model),
-      V_(columns_.count()),
-      D_inverse_(columns_.count()),
+      axis_(columns_.count()),
       Y_(model.n_bodies()),
       W_(model.n_bodies()),
       diagonal_(model.nv()) {}
@@ -55,12 +65,10 @@ bool Mobility::tip_to_base() {
     ArticulatedInertia<double>& Y = Y_[n];
     add_inertia(Y, model.constants[n].inertia);
     for (int k = columns_.first(n + 1) - 1; k >= columns_.first(n); --k) {
-      const Force<double> U = Y * columns_.P(k);
-      const double D = dot(columns_.P(k), U) + armature[columns_.dof(k)];
-      if (!(D > 0)) return false;
-      D_inverse_[k] = 1 / D;
-      V_[k] = {D_inverse_[k] * U.lin, D_inverse_[k] * U.ang};
-      subtract_outer(Y, V_[k], U);
+      const double D = eliminate<ColumnJoint>(Y, Force<double>{}, columns_.P(k),
+                                              armature[columns_.dof(k)], 0.0, axis_[k]);
+      if (!is_positive(D)) return false;
+      reduce_inertia(axis_[k], Y);
     }
     const int parent = model.topology[n].parent;
     if (parent >= 0) Y_[parent] += transform_to_parent(columns_.state(n).X, Y);
@@ -74,15 +82,8 @@ void Mobility::base_to_tip() {
     Matrix6<double>& W = W_[n];
     const int parent = model.topology[n].parent;
     W = parent >= 0 ? transform_to_child(columns_.state(n).X, W_[parent]) : Matrix6<double>{};
-    for (int k = columns_.first(n); k < columns_.first(n + 1); ++k) {
-      const Motion<double> given = W * V_[k];
-      const double mobility = D_inverse_[k] + dot(given, V_[k]);
-      diagonal_[columns_.dof(k)] = mobility;
-      const Vector6<double> p = to_array(columns_.P(k)), g = to_array(given);
-      for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j)
-          W[6 * i + j] += mobility * p[i] * p[j] - p[i] * g[j] - g[i] * p[j];
-    }
+    for (int k = columns_.first(n); k < columns_.first(n + 1); ++k)
+      diagonal_[columns_.dof(k)] = let_move(axis_[k], columns_.P(k), W);
   }
 }
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "linkwise/kinematics/body_columns.hpp"
-#include "linkwise/spatial/matrix6.hpp"
+#include "linkwise/recursion/stack_steps.hpp"
 
 namespace linkwise {
 
@@ -29,8 +29,7 @@ class Mobility {
 
   const Model* model_;
   BodyColumns columns_;
-  std::vector<Force<double>> V_;  ///< U / D, per column
-  std::vector<double> D_inverse_;
+  std::vector<EliminatedAxis<double>> axis_;
   std::vector<ArticulatedInertia<double>> Y_;
   std::vector<Matrix6<double>> W_;
   std::vector<double> diagonal_;

@@ -39,36 +39,37 @@ class PiecewiseChain {
           set_lanes<Group>(bodies[0].inertia, l, RigidBody<double>{1, {}, {{1, 0, 1, 0, 0, 1}}});
       groups_.emplace_back(std::move(bodies));
     }
+    cuts_.resize(groups_.size());
   }
 
   DynamicsReport evaluate(const SweepInput<double>& in, double* du, double* loads) {
     in_ = &in;
     executor_.for_each(n_groups(), [&](int g) {
-      groups_[g].across([&](int k) { return gather(in.q, g, k); },
-                        [&](int k) { return in.v ? gather(in.v, g, k) : Group{}; });
+      cuts_[g].span = groups_[g].across([&](int k) { return gather(in.q, g, k); },
+                                        [&](int k) { return in.v ? gather(in.v, g, k) : Group{}; });
     });
     scan_velocities();
     executor_.for_each(n_groups(), [&](int g) {
-      groups_[g].calc_velocities();
+      groups_[g].calc_velocities(cuts_[g].ends.v_first);
       add_external(g);
-      groups_[g].eliminate_joints([&](int k) { return gather(in.tau, g, k); });
+      cuts_[g].answer =
+          groups_[g].eliminate_joints([&](int k) { return gather(in.tau, g, k); }, cuts_[g].ends);
     });
     assemble();
     DynamicsReport report{solver_->solve(A_, b_, f_)};
-    for (const auto& group : groups_)
-      if (group.failed) report.outcome = Outcome::not_positive_definite;
+    for (const Cuts& cuts : cuts_)
+      if (!cuts.answer.positive) report.outcome = Outcome::not_positive_definite;
     if (!report.ok()) {
       report.body = report.node >= 0 ? first(report.node) : -1;
       return report;
     }
     spread_forces();
     executor_.for_each(n_groups(), [&](int g) {
-      groups_[g].accelerate_bodies(
-          [&](int k, Group rate) {
-            for (int l = 0; l < native_lanes; ++l)
-              if (const int n = body_at(g, l, k); n < n_) du[n] = rate[l];
-          },
-          loads != nullptr);
+      Cuts& cuts = cuts_[g];
+      cuts.motion = groups_[g].accelerate_bodies(cuts.answer, cuts.forces, [&](int k, Group rate) {
+        for (int l = 0; l < native_lanes; ++l)
+          if (const int n = body_at(g, l, k); n < n_) du[n] = rate[l];
+      });
       if (loads) store_loads(g, loads);
     });
     cut_rates(du);
@@ -78,10 +79,19 @@ class PiecewiseChain {
   std::span<const double> constraint_force() const { return f_; }
 
  private:
+  /// What the pieces of a group and the cut system say to each other.
+  struct Cuts {
+    PieceSpan<Group> span;
+    PieceEnds<Group> ends;
+    PieceAnswer<Group> answer;
+    PieceForces<Group> forces;
+    PieceMotion<Group> motion;
+  };
+
   int n_groups() const { return static_cast<int>(groups_.size()); }
   int first(int piece) const { return piece * length_; }
   int body_at(int g, int l, int k) const { return (g * native_lanes + l) * length_ + k; }
-  PieceEnds<Group>& ends(int piece) { return groups_[piece / native_lanes].ends; }
+  Cuts& cuts(int piece) { return cuts_[piece / native_lanes]; }
 
   /// values[body] at position k of each piece; bodies and coordinates of a chain are numbered
   /// alike.
@@ -108,7 +118,7 @@ class PiecewiseChain {
     Motion<double> v_last{};
     for (int s = 0; s < n_pieces_; ++s) {
       const int n = first(s), l = s % native_lanes;
-      PieceEnds<Group>& e = ends(s);
+      PieceEnds<Group>& e = cuts(s).ends;
       if (n >= n_) {
         set_lanes<Group>(e.v_first, l, Motion<double>{});
         for (auto& column : e.cut_columns) set_lanes<Group>(column, l, Motion<double>{});
@@ -128,15 +138,16 @@ class PiecewiseChain {
       set_lanes<Group>(e.v_first, l, v);
       e.first_torque[l] = tau;
       if (s > 0) set_outboard(s - 1, pose_[s], tau);
-      v_last = get_lanes<Transform<double>, Group>(e.across, l) * v;
-      v_last += get_lanes<Motion<double>, Group>(e.relative, l);
+      const PieceSpan<Group>& span = cuts(s).span;
+      v_last = get_lanes<Transform<double>, Group>(span.across, l) * v;
+      v_last += get_lanes<Motion<double>, Group>(span.relative, l);
     }
     clear_outboard(n_pieces_ - 1);
   }
 
   /// The inboard body feels -X^T (Q f + z tau) of the next piece's joint.
   void set_outboard(int s, const Transform<double>& X, double tau) {
-    PieceEnds<Group>& e = ends(s);
+    PieceEnds<Group>& e = cuts(s).ends;
     for (int j = 0; j < cut_rows; ++j) {
       double unit[6] = {};
       unit[j] = 1;
@@ -147,24 +158,24 @@ class PiecewiseChain {
     set_lanes<Group>(e.known_outboard, s % native_lanes, Force<double>{-w.lin, -w.ang});
   }
   void clear_outboard(int s) {
-    for (auto& column : ends(s).cut_columns)
-      set_lanes<Group>(column, s % native_lanes, Motion<double>{});
-    set_lanes<Group>(ends(s).known_outboard, s % native_lanes, Force<double>{});
+    PieceEnds<Group>& e = cuts(s).ends;
+    for (auto& column : e.cut_columns) set_lanes<Group>(column, s % native_lanes, Motion<double>{});
+    set_lanes<Group>(e.known_outboard, s % native_lanes, Force<double>{});
   }
 
   void assemble() {
     const Motion<double> ground = ground_acceleration<double>(model_, in_->gravity_factor);
     for (int s = 0; s < n_pieces_; ++s) {
-      const PieceEnds<Group>& e = ends(s);
+      const PieceAnswer<Group>& own = cuts(s).answer;
       const int l = s % native_lanes;
-      const Motion<double> free = get_lanes<Motion<double>, Group>(e.a_free, l);
+      const Motion<double> free = get_lanes<Motion<double>, Group>(own.a_free, l);
       const Motion<double> from_ground = pose_[s] * ground;
-      const PieceEnds<Group>* in = s > 0 ? &ends(s - 1) : nullptr;
+      const PieceAnswer<Group>* in = s > 0 ? &cuts(s - 1).answer : nullptr;
       const int li = (s + native_lanes - 1) % native_lanes;
       for (int i = 0; i < cut_rows; ++i) {
         for (int j = 0; j < cut_rows; ++j)
           A_.diag[s][block_stride * i + j] =
-              e.QJQ[packed(i, j)][l] + (in ? in->PsiJPsi[packed(i, j)][li] : 0);
+              own.QJQ[packed(i, j)][l] + (in ? in->PsiJPsi[packed(i, j)][li] : 0);
         b_[cut_rows * s + i] = to_array(bias_[s])[i] - to_array(free)[i] +
                                (in ? in->beta[i][li] : to_array(from_ground)[i]);
         if (in)
@@ -177,9 +188,9 @@ class PiecewiseChain {
   void spread_forces() {
     for (int s = 0; s < n_pieces_; ++s)
       for (int j = 0; j < cut_rows; ++j) {
-        ends(s).f_first[j][s % native_lanes] = f_[cut_rows * s + j];
-        ends(s).f_outboard[j][s % native_lanes] =
-            s + 1 < n_pieces_ ? f_[cut_rows * (s + 1) + j] : 0;
+        PieceForces<Group>& forces = cuts(s).forces;
+        forces.first[j][s % native_lanes] = f_[cut_rows * s + j];
+        forces.outboard[j][s % native_lanes] = s + 1 < n_pieces_ ? f_[cut_rows * (s + 1) + j] : 0;
       }
   }
 
@@ -187,13 +198,14 @@ class PiecewiseChain {
     Motion<double> a = ground_acceleration<double>(model_, in_->gravity_factor);
     for (int s = 0; s < n_pieces_ && first(s) < n_; ++s) {
       const int l = s % native_lanes;
-      du[first(s)] = get_lanes<Motion<double>, Group>(ends(s).a_first, l).ang.z -
+      du[first(s)] = get_lanes<Motion<double>, Group>(cuts(s).motion.first, l).ang.z -
                      (pose_[s] * a).ang.z - bias_[s].ang.z;
-      a = get_lanes<Motion<double>, Group>(ends(s).a_last, l);
+      a = get_lanes<Motion<double>, Group>(cuts(s).motion.last, l);
     }
   }
 
-  void store_loads(int g, double* loads) const {
+  void store_loads(int g, double* loads) {
+    groups_[g].calc_loads(cuts_[g].ends, cuts_[g].forces);
     for (int l = 0; l < native_lanes; ++l)
       for (int k = 0; k < length_; ++k) {
         const int n = body_at(g, l, k);  // and the number of its joint
@@ -206,6 +218,7 @@ class PiecewiseChain {
   Executor executor_;
   int n_, n_pieces_, length_;
   std::vector<PieceGroup<Group>> groups_;
+  std::vector<Cuts> cuts_;               ///< by group
   std::vector<Transform<double>> pose_;  ///< across the cut joints
   std::vector<Motion<double>> bias_;     ///< c of the cut joints
   BlockTree A_;

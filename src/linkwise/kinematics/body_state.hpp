@@ -5,6 +5,8 @@
 //     p_n = v_n x* (M_n v_n) - external
 // A stack of elements is walked as if its frames were massless bodies, which gives c_n and the
 // columns of P_n in the body's frame without ever forming dP/dt [featherstone2008, ch. 4].
+#include <utility>
+
 #include "linkwise/model/model.hpp"
 
 namespace linkwise {
@@ -61,24 +63,47 @@ LW_INLINE void dispatch_kind_range(const KindRange& range, F&& f) {
       return f(GeneralJoint{}, range.begin, range.end);
   }
 }
-template <class F>
-LW_INLINE void for_kind_ranges_base_to_tip(const std::vector<KindRange>& ranges, F&& f) {
-  for (const KindRange& range : ranges) dispatch_kind_range(range, f);
-}
-template <class F>
-LW_INLINE void for_kind_ranges_base_to_tip(const Model& model, F&& f) {
-  for_kind_ranges_base_to_tip(model.kind_ranges, f);
-}
-template <class F>
-LW_INLINE void for_kind_ranges_tip_to_base(const std::vector<KindRange>& ranges, F&& f) {
-  for (size_t i = ranges.size(); i-- > 0;) dispatch_kind_range(ranges[i], f);
-}
-template <class F>
-LW_INLINE void for_kind_ranges_tip_to_base(const Model& model, F&& f) {
-  for_kind_ranges_tip_to_base(model.kind_ranges, f);
-}
 template <class J>
 inline constexpr bool is_general = std::is_same_v<J, GeneralJoint>;
+
+/// f(joint, n) for the bodies of some ranges.
+template <class F>
+LW_INLINE void for_bodies_base_to_tip(const std::vector<KindRange>& ranges, F&& f) {
+  for (const KindRange& range : ranges)
+    dispatch_kind_range(range, [&](auto joint, int begin, int end) {
+      for (int n = begin; n < end; ++n) f(joint, n);
+    });
+}
+template <class F>
+LW_INLINE void for_bodies_tip_to_base(const std::vector<KindRange>& ranges, F&& f) {
+  for (size_t i = ranges.size(); i-- > 0;)
+    dispatch_kind_range(ranges[i], [&](auto joint, int begin, int end) {
+      for (int n = end - 1; n >= begin; --n) f(joint, n);
+    });
+}
+
+/// The outward loop of every recursion: step(joint, n, the parent's motion), where of(n) is the
+/// motion of body n, found before, and `ground` that of the ground. By reference: a copy would be
+/// loaded in wide words that the narrow stores just before it cannot be forwarded to, a stall of a
+/// dozen cycles per body.
+template <class S, class Of, class Step>
+LW_INLINE void sweep_outward(const Model& model, const std::vector<KindRange>& ranges,
+                             const Motion<S>& ground, Of&& of, Step&& step) {
+  for_bodies_base_to_tip(ranges, [&](auto joint, int n) {
+    const int parent = model.topology[n].parent;
+    const Motion<S>& carried = parent >= 0 ? of(parent) : ground;
+    step(joint, n, carried);
+  });
+}
+
+/// By body: is it the first of its siblings that a tip-to-base sweep meets?
+inline std::vector<char> first_of_siblings(const Model& model) {
+  std::vector<char> first(model.n_bodies(), 0), met(model.n_bodies(), 0);
+  for (int n = model.n_bodies() - 1; n >= 0; --n)
+    if (const int parent = model.topology[n].parent; parent >= 0)
+      first[n] = !std::exchange(met[parent], 1);
+  return first;
+}
 
 /// One floating joint, P = 1.
 inline bool is_free(const Model& model, const BodyTopology& body) {
@@ -125,46 +150,38 @@ LW_INLINE Force<S> user_wrench(const S* external, const JointInfo& joint, int in
   return transpose_times(joint.to_user, Force<S>{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
 }
 
-/// The states of a range of bodies, external wrenches left out; those of the parents must be there.
-template <class S>
-LW_INLINE void calc_range_states(const Model& model, const KindRange& range,
-                                 const SweepInput<S>& in, BodyState<S>* states,
-                                 GeneralState<S>* general) {
-  const Motion<S> resting{};
-  dispatch_kind_range(range, [&](auto joint, int begin, int end) {
-    using J = decltype(joint);
-    for (int n = begin; n < end; ++n) {
-      const BodyTopology& body = model.topology[n];
-      const BodyConstants<double>& k = model.constants[n];
-      BodyState<S>& s = states[n];
-      // By reference: a copy would be loaded in wide words that the narrow stores just before it
-      // cannot be forwarded to, a stall of a dozen cycles per body.
-      const Motion<S>& v_parent = body.parent >= 0 ? states[body.parent].v : resting;
-      if constexpr (is_general<J>) {
-        calc_general_state(model, body, in, v_parent, s, general[body.general]);
-      } else {
-        s.X = J::pose(k.tree, k.pitch, in.q[body.q]);
-        const S u = in.v ? in.v[body.v] : S{};
-        Motion<S> v = s.X * v_parent;
-        J::add_rate(v, k.pitch, u);
-        s.c = J::bias(v, k.pitch, u);
-        s.v = v;
-      }
-      s.bias = momentum_bias(k.inertia, s.v);
-    }
-  });
+/// f(body, wrench) for all bodies, where there are external wrenches.
+template <class S, class F>
+LW_INLINE void for_external_wrenches(const Model& model, const SweepInput<S>& in, F&& f) {
+  for (int j = 0; in.external && j < model.n_joints(); ++j)
+    if (const JointInfo& joint = model.joints[j]; joint.last_of_body)
+      f(joint.body, user_wrench(in.external, joint, j));
 }
 
 /// Fills states (and general for bodies of that kind). in.v may be null: resting.
 template <class S>
 void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states,
                       GeneralState<S>* general) {
-  for (const KindRange& range : model.kind_ranges)
-    calc_range_states(model, range, in, states, general);
-  if (!in.external) return;
-  for (int j = 0; j < model.n_joints(); ++j)
-    if (model.joints[j].last_of_body)
-      states[model.joints[j].body].bias -= user_wrench(in.external, model.joints[j], j);
+  const auto velocity = [&](int n) -> const Motion<S>& { return states[n].v; };
+  const auto step = [&](auto joint, int n, const Motion<S>& v_parent) {
+    using J = decltype(joint);
+    const BodyTopology& body = model.topology[n];
+    const BodyConstants<double>& k = model.constants[n];
+    BodyState<S>& s = states[n];
+    if constexpr (is_general<J>) {
+      calc_general_state(model, body, in, v_parent, s, general[body.general]);
+    } else {
+      s.X = J::pose(k.tree, k.pitch, in.q[body.q]);
+      const S u = in.v ? in.v[body.v] : S{};
+      Motion<S> v = s.X * v_parent;
+      J::add_rate(v, k.pitch, u);
+      s.c = J::bias(v, k.pitch, u);
+      s.v = v;
+    }
+    s.bias = momentum_bias(k.inertia, s.v);
+  };
+  sweep_outward(model, model.kind_ranges, Motion<S>{}, velocity, step);
+  for_external_wrenches(model, in, [&](int n, const Force<S>& w) { states[n].bias -= w; });
 }
 
 /// Acceleration of the ground: uniform gravity as a_0 = -g.

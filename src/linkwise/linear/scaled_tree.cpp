@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "linkwise/linear/cholesky_root.hpp"
 #include "linkwise/linear/vector.hpp"
 
 namespace linkwise {

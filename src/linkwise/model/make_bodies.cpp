@@ -73,13 +73,6 @@ Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const Bo
     if (out.singular < 0 && is_singular(inertia)) out.singular = b;
     if (body.parent >= 0) ++out.topology[body.parent].n_children;
   }
-  // A tip-to-base sweep meets siblings in falling order.
-  std::vector<char> met(n, 0);
-  for (int b = n - 1; b >= 0; --b) {
-    const int p = out.topology[b].parent;
-    out.topology[b].first_to_give = p >= 0 && !met[p];
-    if (p >= 0) met[p] = 1;
-  }
   return out;
 }
 

@@ -31,8 +31,7 @@ struct BodyTopology {
   int first_element = 0, n_elements = 0;
   int q = 0, nq = 0, v = 0, nv = 0;
   int n_children = 0;
-  bool first_to_give = false;  ///< the first of its siblings that a tip-to-base sweep meets
-  int general = -1;            ///< index among bodies of kind general
+  int general = -1;  ///< index among bodies of kind general
 };
 
 template <class C>

@@ -50,16 +50,23 @@ class PathGroup {
   }
 
   int length() const { return bodies_.length(); }
-  /// From the outermost position to the innermost one, branches in the order of their sums.
-  std::vector<Root> roots;
-  std::vector<Branch> branches;
-  std::vector<OuterParent> outer_parents;
+  const std::vector<Branch>& branches() const { return branches_; }
+  const std::vector<OuterParent>& outer_parents() const { return outer_parents_; }
 
+  void add_branch(const Branch& branch) { branches_.push_back(branch); }
+  void add_outer_parent(const OuterParent& parent) { outer_parents_.push_back(parent); }
   void add_root(const Root& root) {
-    roots.push_back(root);
+    roots_.push_back(root);
     if (root_at_[root.position] >= 0) return;
     root_at_[root.position] = static_cast<int>(from_root_.size());
     from_root_.push_back({});
+  }
+  /// After the last one was added.
+  void sort() {
+    const auto outermost = [](const auto& a, const auto& b) { return a.position < b.position; };
+    std::stable_sort(roots_.begin(), roots_.end(), outermost);
+    std::stable_sort(branches_.begin(), branches_.end(), outermost);
+    std::stable_sort(outer_parents_.begin(), outer_parents_.end(), outermost);
   }
   void keep_loads() { reduced_.resize(length()); }
 
@@ -88,7 +95,7 @@ class PathGroup {
   template <class ParentMotion>
   void calc_velocities(const SweepInput<double>& in, ParentMotion&& parent) {
     Motion<S> v{};
-    size_t root = roots.size();
+    size_t root = roots_.size();
     for (int k = length() - 1; k >= 0; --k) {
       State& s = state_[k];
       enter(k, root, parent, v);
@@ -113,15 +120,15 @@ class PathGroup {
       State& s = state_[k];
       add_inertia(Y, bodies_[k].inertia);
       p += s.bias;
-      if (is_at(branches, branch, k) || is_at(outer_parents, outer, k)) {
+      if (is_at(branches_, branch, k) || is_at(outer_parents_, outer, k)) {
         Contribution<S> sum{};
-        for (; is_at(branches, branch, k); ++branch) {
-          const PathPlace& from = branches[branch].root;
-          add_lanes<S>(sum, branches[branch].lane, group(from).from_roots_at(from.position),
+        for (; is_at(branches_, branch, k); ++branch) {
+          const PathPlace& from = branches_[branch].root;
+          add_lanes<S>(sum, branches_[branch].lane, group(from).from_roots_at(from.position),
                        from.lane);
         }
-        for (; is_at(outer_parents, outer, k); ++outer)
-          add_lanes<S>(sum.Y, outer_parents[outer].lane, from_outer(outer_parents[outer]));
+        for (; is_at(outer_parents_, outer, k); ++outer)
+          add_lanes<S>(sum.Y, outer_parents_[outer].lane, from_outer(outer_parents_[outer]));
         Y += sum.Y;
         p += sum.p;
       }
@@ -150,7 +157,7 @@ class PathGroup {
   template <class ParentMotion>
   void accelerate_bodies(ParentMotion&& parent, double* du, bool with_loads) {
     Motion<S> a{};
-    size_t root = roots.size();
+    size_t root = roots_.size();
     for (int k = length() - 1; k >= 0; --k) {
       State& s = state_[k];
       enter(k, root, parent, a);
@@ -204,11 +211,15 @@ class PathGroup {
 
   template <class ParentMotion>
   LW_INLINE void enter(int k, size_t& root, ParentMotion&& parent, Motion<S>& v) const {
-    for (; root > 0 && roots[root - 1].position == k; --root)
-      set_lanes<S>(v, roots[root - 1].lane, parent(roots[root - 1]));
+    for (; root > 0 && roots_[root - 1].position == k; --root)
+      set_lanes<S>(v, roots_[root - 1].lane, parent(roots_[root - 1]));
   }
 
   LaneBodies<S> bodies_;
+  // From the outermost position to the innermost one, branches in the order of their sums.
+  std::vector<Root> roots_;
+  std::vector<Branch> branches_;
+  std::vector<OuterParent> outer_parents_;
   std::vector<Index> index_;
   std::vector<State> state_;
   std::vector<Reduced> reduced_;  ///< made when loads are first asked for

@@ -9,6 +9,19 @@
 
 namespace linkwise {
 
+/// One column P of a stack, for the steps of one axis.
+struct ColumnJoint {
+  static constexpr bool leaves_zero_row = false;
+  template <class S>
+  LW_INLINE static Force<S> column(const ArticulatedInertia<S>& Y, const Motion<S>& P) {
+    return Y * P;
+  }
+  template <class S>
+  LW_INLINE static S project(const Force<S>& f, const Motion<S>& P) {
+    return dot(P, f);
+  }
+};
+
 /// A joint of several axes, eliminated.
 template <class S>
 struct EliminatedStack {
@@ -67,6 +80,26 @@ LW_INLINE void respond(const GeneralState<S>& joint, const ArticulatedInertia<S>
   for (int i = 0; i < joint.n; ++i) p += Force<S>{y[i] * stack.U[i].lin, y[i] * stack.U[i].ang};
 }
 
+/// a += P du. du: those of all joints.
+template <class S>
+LW_INLINE void add_rates(const GeneralState<S>& joint, const S* du, Motion<S>& a) {
+  for (int i = 0; i < joint.n; ++i) {
+    const S rate = du[joint.dof[i]];
+    a += Motion<S>{rate * joint.P[i].lin, rate * joint.P[i].ang};
+  }
+}
+
+/// tau = P^T w of all elements of a stack, prescribed ones too; w: the load at the body.
+template <class S>
+void project_on_elements(const Model& model, const BodyTopology& body, const S* q, Force<S> w,
+                         S* tau) {
+  for (int i = body.n_elements - 1; i >= 0; --i) {
+    const Element& e = model.elements[body.first_element + i];
+    for (int k = 0; k < e.nv; ++k) tau[e.v + k] = dot(element_column<S>(e, k), w);
+    if (i > 0) w = transpose_times(element_pose(e, q), w);
+  }
+}
+
 /// The joint's accelerations into du; a = X a_p becomes the body's own.
 template <class S>
 LW_INLINE void accelerate(const GeneralState<S>& joint, const EliminatedStack<S>& stack,
@@ -75,10 +108,8 @@ LW_INLINE void accelerate(const GeneralState<S>& joint, const EliminatedStack<S>
   S y[6];
   for (int i = 0; i < joint.n; ++i) y[i] = stack.u[i] - dot(a, stack.U[i]);
   cholesky_solve(joint.n, stack.L, y);
-  for (int i = 0; i < joint.n; ++i) {
-    du[joint.dof[i]] = y[i];
-    a += Motion<S>{y[i] * joint.P[i].lin, y[i] * joint.P[i].ang};
-  }
+  for (int i = 0; i < joint.n; ++i) du[joint.dof[i]] = y[i];
+  add_rates(joint, du, a);
 }
 
 /// A floating joint without rotors: D = Y, and the parent feels nothing but the joint's own forces.

@@ -80,27 +80,36 @@ LW_INLINE Motion<S> outward_velocity(const Place& place, const Motion<S>& v_pare
 }
 
 /// U, D and u of a joint whose outboard side takes Y a + p. Returns D, which must be positive.
-template <class J, class S, class Rotor>
-LW_INLINE S eliminate(const ArticulatedInertia<S>& Y, const Force<S>& p, double pitch,
+/// along: the pitch, or the column of a ColumnJoint.
+template <class J, class S, class Along, class Rotor>
+LW_INLINE S eliminate(const ArticulatedInertia<S>& Y, const Force<S>& p, const Along& along,
                       const Rotor& rotor, const S& tau, EliminatedAxis<S>& out) {
-  out.U = J::column(Y, pitch);
-  S D = J::project(out.U, pitch);
+  out.U = J::column(Y, along);
+  S D = J::project(out.U, along);
   if constexpr (!std::is_same_v<Rotor, NoRotor>) D = D + rotor;
   out.D_inverse = 1.0 / D;
-  out.u = tau - J::project(p, pitch);
+  out.u = tau - J::project(p, along);
   return D;
+}
+
+/// Ya in the place of Y; returns U / D.
+template <class S>
+LW_INLINE Force<S> reduce_inertia(const EliminatedAxis<S>& axis, ArticulatedInertia<S>& Y) {
+  const Force<S> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};
+  subtract_outer(Y, V, axis.U);
+  return V;
 }
 
 /// Ya, and pa in the place of p.
 template <class J, class S>
 LW_INLINE void reduce(const ArticulatedInertia<S>& Y, const EliminatedAxis<S>& axis,
                       const Motion<S>& c, ReducedInertia<J, S>& Ya, Force<S>& p) {
-  const Force<S> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};
   if constexpr (J::leaves_zero_row) {
+    const Force<S> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};
     eliminate_turn(Y, axis.U, V, c, axis.u, Ya, p);
   } else {
     Ya = Y;
-    subtract_outer(Ya, V, axis.U);
+    const Force<S> V = reduce_inertia(axis, Ya);
     p += Ya * c;
     p += Force<S>{axis.u * V.lin, axis.u * V.ang};
   }

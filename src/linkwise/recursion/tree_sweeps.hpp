@@ -1,7 +1,7 @@
 #pragma once
 // The three sweeps of the articulated-body recursion over chosen ranges of a tree, and what they
 // keep of every body. A schedule owns one. It decides which ranges are swept when and by which
-// thread. It fills in what it computes elsewhere: the motion of the bodies that carry a range, and
+// thread. It hands in what it computes elsewhere: the motion of the bodies that carry a range, and
 // what is contributed to them.
 #include <algorithm>
 #include <atomic>
@@ -15,9 +15,188 @@
 namespace linkwise {
 
 template <class S>
-struct TreeSweeps {
+class TreeSweeps {
+ public:
   using Ranges = std::vector<KindRange>;
 
+  explicit TreeSweeps(const Model& tree)
+      : model_(tree),
+        body_(tree.n_bodies()),
+        general_(tree.n_general),
+        stack_(tree.n_general),
+        receiver_(tree.n_bodies()) {
+    const auto& armature = model_.dof_values(DofProperty::armature);
+    const std::vector<char> opens = first_of_siblings(model_);
+    for (int n = 0; n < model_.n_bodies(); ++n) {
+      const BodyTopology& at = model_.topology[n];
+      if (at.parent >= 0) receiver_[n] = {&body_[at.parent].sum, opens[n] != 0};
+      if (at.joint_kind != JointKind::general || !is_free(model_, at)) continue;
+      const auto rotors = armature.begin() + at.v;
+      stack_[at.general].is_free = std::count(rotors, rotors + 6, 0.0) == 6;
+    }
+    bool hinges_only = true;
+    for (const KindRange& range : model_.kind_ranges)
+      hinges_only &= range.joint_kind == JointKind::hinge || range.end == 1;
+    pose_.resize(hinges_only ? 1 : model_.n_bodies());
+  }
+  // Receivers point into it.
+  TreeSweeps(const TreeSweeps&) = delete;
+  TreeSweeps& operator=(const TreeSweeps&) = delete;
+
+  /// From now on body n adds to what the schedule has opened by clear().
+  void add_to_opened(int n) { receiver_[n].opens = false; }
+  /// From now on what body n contributes to its parent goes to `sum`, which receives no other.
+  void send_to(int n, Contribution<S>* sum) { receiver_[n] = {sum, true}; }
+
+  // What the schedule hands in and takes out.
+  const Motion<S>& velocity(int n) const { return body_[n].velocity; }
+  const Motion<S>& acceleration(int n) const { return body_[n].acceleration; }
+  const Contribution<S>& sum(int n) const { return body_[n].sum; }
+  void set_velocity(int n, const Motion<S>& v) { body_[n].velocity = v; }
+  void set_acceleration(int n, const Motion<S>& a) { body_[n].acceleration = a; }
+  void set_joint_load(int n, const Force<S>& w) { reduced_[n].joint_load = w; }
+  void clear(int n) { body_[n].sum = {}; }
+  void clear_inertias(const Ranges& ranges) {
+    for (const KindRange& range : ranges)
+      for (int n = range.begin; n < range.end; ++n) body_[n].sum.Y = {};
+  }
+  void receive(int n, const Contribution<S>& more) { body_[n].sum += more; }
+
+  void start(bool with_loads) {
+    failed_body_ = -1;
+    if (with_loads && reduced_.empty()) reduced_.resize(model_.n_bodies());
+  }
+
+  /// Body whose D is not positive, or -1.
+  int failed_body() const { return failed_body_; }
+  /// Of several failed bodies the outermost is named, whichever thread finds one first.
+  void fail(int n) {
+    int known = failed_body_;
+    while (known < n && !failed_body_.compare_exchange_weak(known, n)) {
+    }
+  }
+
+  /// Base to tip: velocities and bias wrenches. `again`: at the position of the last call.
+  template <bool again = false>
+  void calc_velocities(const SweepInput<S>& in, const Ranges& ranges) {
+    const auto velocity_of = [&](int n) -> const Motion<S>& { return body_[n].velocity; };
+    const auto step = [&](auto joint, int n, const Motion<S>& v_parent) {
+      using J = decltype(joint);
+      const BodyTopology& at = model_.topology[n];
+      const BodyConstants<double>& k = model_.constants[n];
+      Body& b = body_[n];
+      if constexpr (is_general<J>) {
+        calc_stack_velocity(in, n, v_parent);
+      } else {
+        if constexpr (!again) calc_placement<J>(in.q[at.q], n);
+        store(b.velocity,
+              outward_velocity<J>(place<J>(n), v_parent, k.pitch, in.v ? in.v[at.v] : S{}));
+      }
+      b.sum.p = momentum_bias(k.inertia, b.velocity);
+    };
+    sweep_outward(model_, ranges, Motion<S>{}, velocity_of, step);
+  }
+
+  /// What calc_velocities<true>() gives for a machine at rest.
+  void rest(const SweepInput<S>& in) {
+    for (int n = 0; n < model_.n_bodies(); ++n) {
+      body_[n].velocity = {};
+      body_[n].sum.p = {};
+      const BodyTopology& at = model_.topology[n];
+      if (at.joint_kind != JointKind::general) continue;
+      BodyState<S> state;
+      if (in.prescribed && !stack_[at.general].is_free)
+        calc_general_state(model_, at, in, body_[n].velocity, state, general_[at.general]);
+      stack_[at.general].c = state.c;
+    }
+  }
+
+  void add_external(const SweepInput<S>& in) {
+    for_external_wrenches(model_, in, [&](int n, const Force<S>& w) { body_[n].sum.p -= w; });
+  }
+
+  // Whether loads are wanted is asked while sweeping: two instantiations would be contracted to
+  // fused multiply-adds in two ways, and recording loads would change the motion's last bits.
+
+  /// Tip to base: eliminates the joints. Everything outboard of the ranges has contributed.
+  void eliminate_joints(const SweepInput<S>& in, const Ranges& ranges, bool with_loads) {
+    for_bodies_tip_to_base(ranges, [&](auto joint, int n) {
+      using J = decltype(joint);
+      const BodyTopology& at = model_.topology[n];
+      const BodyConstants<double>& k = model_.constants[n];
+      Body& b = body_[n];
+      ArticulatedInertia<S> Y{};
+      if (at.n_children > 0) Y = b.sum.Y;
+      add_inertia(Y, k.inertia);
+      if constexpr (is_general<J>) {
+        eliminate_stack(in, n, Y, with_loads);
+      } else {
+        EliminatedAxis<S> axis;
+        if (!eliminate_axis<J>(Y, b.sum.p, k, in.tau[at.v], axis)) fail(n);
+        store(b.axis.U, axis.U);
+        b.axis.D_inverse = axis.D_inverse;
+        b.axis.u = axis.u;
+        if (!with_loads && at.parent < 0) return;
+        Force<S> p = b.sum.p;
+        ReducedInertia<J, S> Ya;
+        reduce<J>(Y, axis, J::bias(b.velocity, k.pitch, in.v ? in.v[at.v] : S{}), Ya, p);
+        if (with_loads) keep<J>(n, Ya, p);
+        if (at.parent >= 0) contribute(n, place<J>(n), Ya, p);
+      }
+    });
+  }
+
+  /// Tip to base over all bodies for another right-hand side, with the factors at hand.
+  template <bool moving>
+  void respond_joints(const SweepInput<S>& in) {
+    for_bodies_tip_to_base(model_.kind_ranges, [&](auto joint, int n) {
+      using J = decltype(joint);
+      const BodyTopology& at = model_.topology[n];
+      const BodyConstants<double>& k = model_.constants[n];
+      Body& b = body_[n];
+      Force<S> p = b.sum.p;
+      if constexpr (is_general<J>) {
+        respond_stack(in, n, p);
+      } else {
+        Motion<S> c;
+        if constexpr (moving) c = J::bias(b.velocity, k.pitch, in.v[at.v]);
+        respond<J, moving>(reduced_[n].template inertia<J>(), c, k.pitch, in.tau[at.v], b.axis, p);
+      }
+      store(reduced_[n].p, p);
+      if (at.parent >= 0) body_[at.parent].sum.p += place<J>(n).to_parent(p);
+    });
+  }
+
+  /// Base to tip: accelerations and joint loads. Everything inboard of the ranges has its own.
+  void accelerate_bodies(const SweepInput<S>& in, const Ranges& ranges, S* du, bool with_loads) {
+    const Motion<S> ground = ground_acceleration<S>(model_, in.gravity_factor);
+    const auto acceleration_of = [&](int n) -> const Motion<S>& { return body_[n].acceleration; };
+    const auto step = [&](auto joint, int n, const Motion<S>& a_parent) {
+      using J = decltype(joint);
+      const BodyTopology& at = model_.topology[n];
+      const BodyConstants<double>& k = model_.constants[n];
+      Body& b = body_[n];
+      Motion<S> a = place<J>(n).to_child(a_parent);
+      if (with_loads)
+        store(reduced_[n].joint_load,
+              outward_load(reduced_[n].template inertia<J>(), reduced_[n].p, a));
+      if constexpr (is_general<J>) {
+        accelerate_stack(in, n, a, du);
+      } else {
+        const Motion<S> c = J::bias(b.velocity, k.pitch, in.v ? in.v[at.v] : S{});
+        du[at.v] = accelerate<J>(b.axis, c, k.pitch, a);
+      }
+      store(b.acceleration, a);
+    };
+    sweep_outward(model_, ranges, ground, acceleration_of, step);
+  }
+
+  void store_loads(const S* q, S* loads) const {
+    store_joint_loads(
+        model_, q, [&](int n) -> const Force<S>& { return reduced_[n].joint_load; }, loads);
+  }
+
+ private:
   // The unions over time keep a large tree in less memory: a fifth of the time of 10,000 bodies
   // (benchmarks/cpp/crossovers.cpp).
   struct Body {
@@ -64,195 +243,21 @@ struct TreeSweeps {
     bool opens = false;  ///< sets sum->Y instead of adding to it
   };
 
-  explicit TreeSweeps(const Model& tree)
-      : model(tree),
-        body(tree.n_bodies()),
-        general(tree.n_general),
-        stack(tree.n_general),
-        receiver(tree.n_bodies()) {
-    const auto& armature = model.dof_values(DofProperty::armature);
-    for (int n = 0; n < model.n_bodies(); ++n) {
-      const BodyTopology& at = model.topology[n];
-      if (at.parent >= 0) receiver[n] = {&body[at.parent].sum, at.first_to_give};
-      if (at.joint_kind != JointKind::general || !is_free(model, at)) continue;
-      const auto rotors = armature.begin() + at.v;
-      stack[at.general].is_free = std::count(rotors, rotors + 6, 0.0) == 6;
-    }
-    bool hinges_only = true;
-    for (const KindRange& range : model.kind_ranges)
-      hinges_only &= range.joint_kind == JointKind::hinge || range.end == 1;
-    pose.resize(hinges_only ? 1 : model.n_bodies());
-  }
-  // Receivers point into it.
-  TreeSweeps(const TreeSweeps&) = delete;
-  TreeSweeps& operator=(const TreeSweeps&) = delete;
-
-  const Model& model;
-  std::vector<Body> body;
-  std::vector<Transform<S>> pose;  ///< of bodies that are no hinges
-  std::vector<GeneralState<S>> general;
-  std::vector<Stack> stack;
-  std::vector<Receiver> receiver;
-  std::vector<Reduced> reduced;  ///< made when loads are first asked for
-  std::atomic<int> failed_body = -1;
-
-  void start(bool with_loads) {
-    failed_body = -1;
-    if (with_loads && reduced.empty()) reduced.resize(model.n_bodies());
-  }
-
-  /// Of several failed bodies the outermost is named, whichever thread finds one first.
-  void fail(int n) {
-    int known = failed_body;
-    while (known < n && !failed_body.compare_exchange_weak(known, n)) {
-    }
-  }
-
-  /// Base to tip: velocities and bias wrenches. `again`: at the position of the last call.
-  template <bool again = false>
-  void calc_velocities(const SweepInput<S>& in, const Ranges& ranges) {
-    const Motion<S> resting{};
-    for_kind_ranges_base_to_tip(ranges, [&](auto joint, int begin, int end) {
-      using J = decltype(joint);
-      for (int n = begin; n < end; ++n) {
-        const BodyTopology& at = model.topology[n];
-        const BodyConstants<double>& k = model.constants[n];
-        Body& b = body[n];
-        const Motion<S>& v_parent = at.parent >= 0 ? body[at.parent].velocity : resting;
-        if constexpr (is_general<J>) {
-          calc_stack_velocity(in, n, v_parent);
-        } else {
-          if constexpr (!again) calc_placement<J>(in.q[at.q], n);
-          store(b.velocity,
-                outward_velocity<J>(place<J>(n), v_parent, k.pitch, in.v ? in.v[at.v] : S{}));
-        }
-        b.sum.p = momentum_bias(k.inertia, b.velocity);
-      }
-    });
-  }
-
-  /// What calc_velocities<true>() gives for a machine at rest.
-  void rest(const SweepInput<S>& in) {
-    for (int n = 0; n < model.n_bodies(); ++n) {
-      body[n].velocity = {};
-      body[n].sum.p = {};
-      const BodyTopology& at = model.topology[n];
-      if (at.joint_kind != JointKind::general) continue;
-      BodyState<S> state;
-      if (in.prescribed && !stack[at.general].is_free)
-        calc_general_state(model, at, in, body[n].velocity, state, general[at.general]);
-      stack[at.general].c = state.c;
-    }
-  }
-
-  void add_external(const SweepInput<S>& in) {
-    if (!in.external) return;
-    for (int j = 0; j < model.n_joints(); ++j)
-      if (model.joints[j].last_of_body)
-        body[model.joints[j].body].sum.p -= user_wrench(in.external, model.joints[j], j);
-  }
-
-  // Whether loads are wanted is asked while sweeping: two instantiations would be contracted to
-  // fused multiply-adds in two ways, and recording loads would change the motion's last bits.
-
-  /// Tip to base: eliminates the joints. Everything outboard of the ranges has contributed.
-  void eliminate_joints(const SweepInput<S>& in, const Ranges& ranges, bool with_loads) {
-    for_kind_ranges_tip_to_base(ranges, [&](auto joint, int begin, int end) {
-      using J = decltype(joint);
-      for (int n = end - 1; n >= begin; --n) {
-        const BodyTopology& at = model.topology[n];
-        const BodyConstants<double>& k = model.constants[n];
-        Body& b = body[n];
-        ArticulatedInertia<S> Y{};
-        if (at.n_children > 0) Y = b.sum.Y;
-        add_inertia(Y, k.inertia);
-        if constexpr (is_general<J>) {
-          eliminate_stack(in, n, Y, with_loads);
-        } else {
-          EliminatedAxis<S> axis;
-          if (!eliminate_axis<J>(Y, b.sum.p, k, in.tau[at.v], axis)) fail(n);
-          store(b.axis.U, axis.U);
-          b.axis.D_inverse = axis.D_inverse;
-          b.axis.u = axis.u;
-          if (!with_loads && at.parent < 0) continue;
-          Force<S> p = b.sum.p;
-          ReducedInertia<J, S> Ya;
-          reduce<J>(Y, axis, J::bias(b.velocity, k.pitch, in.v ? in.v[at.v] : S{}), Ya, p);
-          if (with_loads) keep<J>(n, Ya, p);
-          if (at.parent >= 0) contribute(n, place<J>(n), Ya, p);
-        }
-      }
-    });
-  }
-
-  /// Tip to base over all bodies for another right-hand side, with the factors at hand.
-  template <bool moving>
-  void respond_joints(const SweepInput<S>& in) {
-    for_kind_ranges_tip_to_base(model.kind_ranges, [&](auto joint, int begin, int end) {
-      using J = decltype(joint);
-      for (int n = end - 1; n >= begin; --n) {
-        const BodyTopology& at = model.topology[n];
-        const BodyConstants<double>& k = model.constants[n];
-        Body& b = body[n];
-        Force<S> p = b.sum.p;
-        if constexpr (is_general<J>) {
-          respond_stack(in, n, p);
-        } else {
-          Motion<S> c;
-          if constexpr (moving) c = J::bias(b.velocity, k.pitch, in.v[at.v]);
-          respond<J, moving>(reduced[n].template inertia<J>(), c, k.pitch, in.tau[at.v], b.axis, p);
-        }
-        store(reduced[n].p, p);
-        if (at.parent >= 0) body[at.parent].sum.p += place<J>(n).to_parent(p);
-      }
-    });
-  }
-
-  /// Base to tip: accelerations and joint loads. Everything inboard of the ranges has its own.
-  void accelerate_bodies(const SweepInput<S>& in, const Ranges& ranges, S* du, bool with_loads) {
-    const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
-    for_kind_ranges_base_to_tip(ranges, [&](auto joint, int begin, int end) {
-      using J = decltype(joint);
-      for (int n = begin; n < end; ++n) {
-        const BodyTopology& at = model.topology[n];
-        const BodyConstants<double>& k = model.constants[n];
-        Body& b = body[n];
-        Motion<S> a = place<J>(n).to_child(at.parent >= 0 ? body[at.parent].acceleration : ground);
-        if (with_loads)
-          store(reduced[n].joint_load,
-                outward_load(reduced[n].template inertia<J>(), reduced[n].p, a));
-        if constexpr (is_general<J>) {
-          accelerate_stack(in, n, a, du);
-        } else {
-          const Motion<S> c = J::bias(b.velocity, k.pitch, in.v ? in.v[at.v] : S{});
-          du[at.v] = accelerate<J>(b.axis, c, k.pitch, a);
-        }
-        store(b.acceleration, a);
-      }
-    });
-  }
-
-  void store_loads(const S* q, S* loads) const {
-    store_joint_loads(
-        model, q, [&](int n) -> const Force<S>& { return reduced[n].joint_load; }, loads);
-  }
-
- private:
   template <class J>
   LW_INLINE auto place(int n) const {
     if constexpr (J::is_hinge)
-      return TurnedHinge<double, S>{placement(model.constants[n]), body[n].cosine, body[n].sine};
+      return TurnedHinge<double, S>{placement(model_.constants[n]), body_[n].cosine, body_[n].sine};
     else
-      return Pose<S>{pose[n]};
+      return Pose<S>{pose_[n]};
   }
 
   template <class J>
   LW_INLINE void calc_placement(const S& q, int n) {
-    const BodyConstants<double>& k = model.constants[n];
+    const BodyConstants<double>& k = model_.constants[n];
     if constexpr (J::is_hinge)
-      sincos(S(q + k.theta), body[n].sine, body[n].cosine);
+      sincos(S(q + k.theta), body_[n].sine, body_[n].cosine);
     else
-      pose[n] = J::pose(k.tree, k.pitch, q);
+      pose_[n] = J::pose(k.tree, k.pitch, q);
   }
 
   template <class J>
@@ -267,13 +272,13 @@ struct TreeSweeps {
 
   template <class J>
   LW_INLINE void keep(int n, const ReducedInertia<J, S>& Ya, const Force<S>& p) {
-    store(reduced[n].template inertia<J>(), Ya);
-    store(reduced[n].p, p);
+    store(reduced_[n].template inertia<J>(), Ya);
+    store(reduced_[n].p, p);
   }
 
   template <class Place, class Inertia>
   LW_INLINE void contribute(int n, const Place& at, const Inertia& Ya, const Force<S>& pa) {
-    const Receiver& to = receiver[n];
+    const Receiver& to = receiver_[n];
     const ArticulatedInertia<S> Y = at.to_parent(Ya);
     const Force<S> p = at.to_parent(pa);
     if (to.opens)
@@ -284,31 +289,31 @@ struct TreeSweeps {
   }
 
   void calc_stack_velocity(const SweepInput<S>& in, int n, const Motion<S>& v_parent) {
-    const BodyTopology& at = model.topology[n];
-    Stack& own = stack[at.general];
+    const BodyTopology& at = model_.topology[n];
+    Stack& own = stack_[at.general];
     BodyState<S> state;
     if (own.is_free) {
-      state.X = element_pose(model.elements[at.first_element], in.q);
+      state.X = element_pose(model_.elements[at.first_element], in.q);
       Motion<S> relative{};
       if (in.v) relative = to_motion(in.v + at.v);
       state.v = state.X * v_parent;
       state.v += relative;
       state.c = cross(state.v, relative);
     } else {
-      calc_general_state(model, at, in, v_parent, state, general[at.general]);
+      calc_general_state(model_, at, in, v_parent, state, general_[at.general]);
     }
-    pose[n] = state.X;
-    body[n].velocity = state.v;
+    pose_[n] = state.X;
+    body_[n].velocity = state.v;
     own.c = state.c;
   }
 
   void eliminate_stack(const SweepInput<S>& in, int n, ArticulatedInertia<S>& Y, bool with_loads) {
-    const BodyTopology& at = model.topology[n];
-    Stack& own = stack[at.general];
+    const BodyTopology& at = model_.topology[n];
+    Stack& own = stack_[at.general];
     if (own.is_free) return eliminate_free(in, n, Y, with_loads);
-    const GeneralState<S>& joint = general[at.general];
-    Force<S> p = body[n].sum.p;
-    const double* armature = model.dof_values(DofProperty::armature).data();
+    const GeneralState<S>& joint = general_[at.general];
+    Force<S> p = body_[n].sum.p;
+    const double* armature = model_.dof_values(DofProperty::armature).data();
     if (!eliminate(joint, Y, p, armature, in.tau, own.columns)) fail(n);
     if (!with_loads && at.parent < 0) return;
     reduce(joint.n, own.columns, own.c, Y, p);
@@ -319,36 +324,45 @@ struct TreeSweeps {
   /// The parent feels nothing but the joint's own forces.
   void eliminate_free(const SweepInput<S>& in, int n, const ArticulatedInertia<S>& Y,
                       bool with_loads) {
-    const BodyTopology& at = model.topology[n];
+    const BodyTopology& at = model_.topology[n];
     const Force<S> tau = to_force(in.tau + at.v);
-    if (!eliminate(Y, body[n].sum.p, tau, stack[at.general].free)) fail(n);
+    if (!eliminate(Y, body_[n].sum.p, tau, stack_[at.general].free)) fail(n);
     const ArticulatedInertia<S> none{};
     if (with_loads) keep<GeneralJoint>(n, none, tau);
     if (at.parent >= 0) contribute(n, place<GeneralJoint>(n), none, tau);
   }
 
   void respond_stack(const SweepInput<S>& in, int n, Force<S>& p) {
-    const BodyTopology& at = model.topology[n];
-    Stack& own = stack[at.general];
+    const BodyTopology& at = model_.topology[n];
+    Stack& own = stack_[at.general];
     if (own.is_free) {
       const Force<S> tau = to_force(in.tau + at.v);
       respond(p, tau, own.free);
       p = tau;
     } else {
-      respond(general[at.general], reduced[n].full, own.c, in.tau, own.columns, p);
+      respond(general_[at.general], reduced_[n].full, own.c, in.tau, own.columns, p);
     }
   }
 
   void accelerate_stack(const SweepInput<S>& in, int n, Motion<S>& a, S* du) {
-    const BodyTopology& at = model.topology[n];
-    const Stack& own = stack[at.general];
+    const BodyTopology& at = model_.topology[n];
+    const Stack& own = stack_[at.general];
     if (own.is_free) {
       accelerate(own.free, own.c, a, du + at.v);
     } else {
-      accelerate(general[at.general], own.columns, own.c, a, du);
-      copy_prescribed(model, at, in, du);
+      accelerate(general_[at.general], own.columns, own.c, a, du);
+      copy_prescribed(model_, at, in, du);
     }
   }
+
+  const Model& model_;
+  std::vector<Body> body_;
+  std::vector<Transform<S>> pose_;  ///< of bodies that are no hinges
+  std::vector<GeneralState<S>> general_;
+  std::vector<Stack> stack_;
+  std::vector<Receiver> receiver_;
+  std::vector<Reduced> reduced_;  ///< made when loads are first asked for
+  std::atomic<int> failed_body_ = -1;
 };
 
 }  // namespace linkwise

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "linkwise/linear/cholesky_root.hpp"
+#include "linkwise/linear/block.hpp"
 
 namespace linkwise::testing {
 namespace {

@@ -20,7 +20,8 @@ class CyclicReduction final : public DirectSolver {
 
  private:
   struct Node {
-    PackedLower lower;  ///< the pivot block, then its L and 1 / D
+    PackedLower pivot;  ///< what eliminations have left of the diagonal block
+    PackedLower lower;  ///< its L and 1 / D
     Block coupling;     ///< to the nearest remaining node towards the base, padded with zeros
     Block base, tip;    ///< L^-1 times the couplings to both neighbours when it was eliminated
   };
@@ -39,12 +40,13 @@ bool CyclicReduction::eliminate(const BlockTree& A, int base, int i, int tip) {
   Node& node = nodes_[i];
   return with_dim(A.dim[i], [&](auto d) {
     const double* const lower = node.lower.data();
+    node.lower = node.pivot;
     if (!ldlt_factor<d.n>(node.lower.data())) return false;
     if (base >= 0) {
       node.base = node.coupling;
       ldlt_forward_block<d.n, 6>(lower, node.base.data());
       with_dim(A.dim[base], [&](auto c) {
-        ldlt_downdate<d.n, c.n>(lower, node.base.data(), nodes_[base].lower.data());
+        ldlt_downdate<d.n, c.n>(lower, node.base.data(), nodes_[base].pivot.data());
       });
     }
     if (tip < 0) return true;
@@ -53,7 +55,7 @@ bool CyclicReduction::eliminate(const BlockTree& A, int base, int i, int tip) {
       for (int k = 0; k < 6; ++k) node.tip[6 * r + k] = next.coupling[6 * k + r];
     ldlt_forward_block<d.n, 6>(lower, node.tip.data());
     with_dim(A.dim[tip],
-             [&](auto c) { ldlt_downdate<d.n, c.n>(lower, node.tip.data(), next.lower.data()); });
+             [&](auto c) { ldlt_downdate<d.n, c.n>(lower, node.tip.data(), next.pivot.data()); });
     next.coupling.fill(0.0);
     if (base < 0) return true;
     for (int r = 0; r < d.n; ++r)
@@ -70,7 +72,7 @@ int CyclicReduction::factor_matrix(const BlockTree& A) {
   nodes_.resize(A.n());
   for (int i = 0; i < A.n(); ++i) {
     Node& node = nodes_[i];
-    with_dim(A.dim[i], [&](auto d) { pack_lower<d.n>(A.diag[i].data(), node.lower.data()); });
+    with_dim(A.dim[i], [&](auto d) { pack_lower<d.n>(A.diag[i].data(), node.pivot.data()); });
     node.coupling.fill(0.0);
     if (A.parent[i] < 0) continue;
     for (int r = 0; r < A.dim[i]; ++r)

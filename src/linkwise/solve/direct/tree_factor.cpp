@@ -179,7 +179,7 @@ void TreeFactor::sweep_base_to_tip(double* x) {
     const Node& node = nodes_[i];
     const int p = parent_[i];
     const bool hub_child = lever_[i] >= 0;
-    double* const source = p < 0 ? nullptr : hub_child ? hubs_[hub_[p]].response : x + offset_[p];
+    double* const source = p < 0 ? nullptr : hub_child ? hubs_[hub_[p]].carried : x + offset_[p];
     const int cols = p < 0 ? 0 : hub_child ? 6 : dim_[p];
     with_dims(dim_[i], cols, [&](auto d, auto c) {
       double inboard[6] = {}, local[6];
@@ -193,8 +193,8 @@ void TreeFactor::sweep_base_to_tip(double* x) {
     if (hub_child) block_transpose_multiply_add(dim_[i], 6, levers_[lever_[i]], xi, source);
     if (hub_[i] < 0) continue;
     HubState& body = hubs_[hub_[i]];
-    std::fill(body.response, body.response + 6, 0.0);
-    block_transpose_multiply_add(dim_[i], 6, body.inboard, xi, body.response, -1.0);
+    std::fill(body.carried, body.carried + 6, 0.0);
+    block_transpose_multiply_add(dim_[i], 6, body.inboard, xi, body.carried, -1.0);
   }
 }
 

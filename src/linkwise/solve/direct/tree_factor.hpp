@@ -30,13 +30,14 @@ class TreeFactor {
 
  private:
   struct Node {
-    PackedLower lower;  ///< L and 1 / D of the node's pivot block
+    PackedLower lower;  ///< the pivot block, factored in place: L and 1 / D
     Block inboard;      ///< L^-1 A_ip, or L^-1 H_i C for the child of a hub
   };
   struct HubState {
     Block change;        ///< C - C_0 after the outboard joints eliminated so far
     Block inboard;       ///< K
-    double response[6];  ///< forward sweep: C sum H^T S^-1 r; back: sum H^T x - K^T x_p
+    double response[6];  ///< C sum H^T S^-1 r
+    double carried[6];   ///< sum H^T x - K^T x_p
   };
 
   void set_structure(const BlockTree& A, std::span<const char> cut);

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "linkwise/linear/cholesky_root.hpp"
 #include "linkwise/linear/symmetric_eigen.hpp"
 
 namespace linkwise {

@@ -1,13 +1,13 @@
 #pragma once
-// A joint of several axes or of none in the system that constraint_elimination.hpp eliminates: its
+// The steps of the constraint-force elimination for a joint of several axes or of none: its
 // constrained directions B turn with the configuration, and their number is known at run time.
 #include "linkwise/constraint/joint_constraint.hpp"
-#include "linkwise/dynamics/joint_elimination.hpp"
+#include "linkwise/recursion/constraint_steps.hpp"
 
 namespace linkwise {
 
 template <class S>
-class GeneralElimination {
+class StackConstraint {
  public:
   /// Velocity of the body, P and B. `again`: at the position of the last call.
   void calc_state(const Model& model, const BodyTopology& body, const SweepInput<S>& in,
@@ -28,8 +28,7 @@ class GeneralElimination {
 
   /// Adds the drives' wrench to that on the body, and takes it from the parent's, which may be
   /// null.
-  void add_drives(const std::vector<double>& armature, const S* tau, Force<S>& on_body,
-                  Force<S>* on_parent) {
+  void add_drives(const double* armature, const S* tau, Force<S>& on_body, Force<S>* on_parent) {
     known_ = {};
     for (int i = 0; i < joint_.free; ++i) {
       const int dof = joint_.dof[i];
@@ -42,7 +41,7 @@ class GeneralElimination {
   }
 
   /// B^T (X a_p + c - alpha) + tau / armature, zero beyond the joint's own rows.
-  void calc_gap(const std::vector<double>& armature, const S* tau, const Motion<S>& a_parent,
+  void calc_gap(const double* armature, const S* tau, const Motion<S>& a_parent,
                 const Motion<S>& alpha, S* b) const {
     Motion<S> gap = X_ * a_parent;
     gap += c_;
