@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "linkwise/dynamics/inverse_dynamics.hpp"
+#include "linkwise/kinematics/body_columns.hpp"
 
 namespace linkwise {
 
@@ -27,12 +28,9 @@ class CompositeRigidBody {
 
   const Model* model_;
   InverseDynamics<double> inverse_;
-  std::vector<BodyState<double>> state_;
-  std::vector<GeneralState<double>> general_;
+  BodyColumns columns_;
   std::vector<Inertia<double>> composite_;
-  std::vector<int> first_;   ///< per body: its first sweep degree of freedom (parents first)
-  std::vector<int> before_;  ///< per sweep degree of freedom: the next one towards the base, -1
-  std::vector<int> dof_;     ///< per sweep degree of freedom: index in v
+  std::vector<int> before_;  ///< per column: the next one towards the base, -1
   std::vector<double> H_, tau_, rhs_;
   int failed_body_ = -1;
 };

@@ -1,29 +1,12 @@
 #pragma once
 // A state in uniform form, for code off the fast path: the motion subspace of every body as a list
 // of columns, whatever its joint.
+#include <algorithm>
 #include <vector>
 
 #include "linkwise/kinematics/body_state.hpp"
 
 namespace linkwise {
-
-/// Fills P and the indices in v of a body's free degrees of freedom; returns their number.
-/// `general` as calc_body_states left it.
-inline int body_columns(const Model& model, int n, const std::vector<GeneralState<double>>& general,
-                        Motion<double>* P, int* dof) {
-  const BodyTopology& body = model.topology[n];
-  if (body.joint_kind == JointKind::general) {
-    const auto& g = general[body.general];
-    for (int i = 0; i < g.n; ++i) {
-      P[i] = g.P[i];
-      dof[i] = g.dof[i];
-    }
-    return g.n;
-  }
-  P[0] = element_column<double>(model.elements[body.first_element], 0);
-  dof[0] = body.v;
-  return 1;
-}
 
 /// Columns of all bodies, parents first; those of body n are first(n) to first(n + 1) - 1.
 class BodyColumns {
@@ -45,8 +28,17 @@ class BodyColumns {
 
   void update(const SweepInput<double>& in) {
     calc_body_states(*model_, in, state_.data(), general_.data());
-    for (int n = 0; n < model_->n_bodies(); ++n)
-      body_columns(*model_, n, general_, P_.data() + first_[n], dof_.data() + first_[n]);
+    for (int n = 0; n < model_->n_bodies(); ++n) {
+      const BodyTopology& body = model_->topology[n];
+      if (body.joint_kind == JointKind::general) {
+        const GeneralState<double>& g = general_[body.general];
+        std::copy_n(g.P, g.n, P_.begin() + first_[n]);
+        std::copy_n(g.dof, g.n, dof_.begin() + first_[n]);
+      } else {
+        P_[first_[n]] = element_column<double>(model_->elements[body.first_element], 0);
+        dof_[first_[n]] = body.v;
+      }
+    }
   }
 
   int count() const { return count_; }

@@ -43,8 +43,6 @@ struct BlockTree {
   int n() const { return static_cast<int>(parent.size()); }
   /// Number of scalar unknowns.
   int size() const { return offset.empty() ? 0 : offset.back(); }
-  /// The hub through which node i couples inboard, or nullptr.
-  const Hub* inboard_hub(int i) const { return lever_of[i] < 0 ? nullptr : &hubs[hub[parent[i]]]; }
 
   /// Lays the structure out: offsets, hubs and levers from parents and dimensions; blocks are zero.
   void set_structure(std::span<const int> parents, std::span<const int> dims);
