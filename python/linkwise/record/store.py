@@ -180,7 +180,8 @@ class RunWriter:
         group.update_attributes({name: plain(value) for name, value in attrs.items()})
         # Room for the last words of a run that fills the disk; no file system packs these bytes.
         size = SPARE_BYTES + 2 * (where / "zarr.json").stat().st_size
-        (where / GROUP / SPARE).write_bytes(os.urandom(size))
+        with contextlib.suppress(OSError):  # without it the run ends as one that was killed
+            (where / GROUP / SPARE).write_bytes(os.urandom(size))
 
     def append(self, chunk: Mapping[str, Any]) -> None:
         """Take what one call of `Simulation.advance` returned."""
