@@ -1,6 +1,7 @@
 // ModelBuilder and what else makes a Model from Python's numbers.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 
 #include "bind.hpp"
 #include "linkwise/model/builder.hpp"
@@ -79,6 +80,13 @@ void bind_builder(nb::module_& m) {
       .def_prop_ro("level", [](const Note& n) { return note_level_name(n.level); })
       .def_ro("element", &Note::element)
       .def_ro("text", &Note::text)
+      .def("__getstate__",
+           [](const Note& n) { return std::tuple(static_cast<int>(n.level), n.element, n.text); })
+      .def("__setstate__",
+           [](Note& n, const std::tuple<int, std::string, std::string>& state) {
+             const auto& [level, element, text] = state;
+             new (&n) Note{static_cast<NoteLevel>(level), element, text};
+           })
       .def("__repr__", [](const Note& n) { return "Note(" + n.element + ": " + n.text + ")"; });
 
   nb::class_<ModelBuilder>(

@@ -1,6 +1,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 
 #include "bind.hpp"
 #include "linkwise/integrate/integrator.hpp"
@@ -140,6 +141,32 @@ nb::list integrator_list() {
   return out;
 }
 
+/// What pickling keeps of a report.
+using ReportState =
+    std::tuple<int, std::string, std::string, std::string, int, std::string, int, double>;
+
+ReportState state_of(const PyReport& r) {
+  return {static_cast<int>(r.outcome),
+          r.choice.method,
+          r.choice.solver,
+          r.choice.reason,
+          r.body,
+          r.body_name,
+          r.iterations,
+          r.error_estimate};
+}
+
+PyReport report_of(const ReportState& state) {
+  PyReport r;
+  int outcome = 0;
+  std::tie(outcome, r.choice.method, r.choice.solver, r.choice.reason, r.body, r.body_name,
+           r.iterations, r.error_estimate) = state;
+  r.outcome = static_cast<Outcome>(outcome);
+  return r;
+}
+
+using ForwardState = std::tuple<nb::object, nb::object, nb::object, ReportState>;
+
 void bind_results(nb::module_& m) {
   nb::exception<NumericsError>(m, "NumericsError", PyExc_RuntimeError).attr("__module__") =
       "linkwise";
@@ -154,6 +181,9 @@ void bind_results(nb::module_& m) {
       .def_ro("iterations", &PyReport::iterations)
       .def_ro("error_estimate", &PyReport::error_estimate,
               "Relative A-norm error of the constraint forces.")
+      .def("__getstate__", &state_of)
+      .def("__setstate__",
+           [](PyReport& r, const ReportState& state) { new (&r) PyReport(report_of(state)); })
       .def("__repr__", [](const PyReport& r) {
         return "Report(" + std::string(to_string(r.outcome)) + ", method " + r.choice.method +
                (r.choice.solver.empty() ? "" : ", solver " + r.choice.solver) + ", " +
@@ -165,7 +195,16 @@ void bind_results(nb::module_& m) {
               "(..., n_joints, 6), N and N m, joint frame, joint point.")
       .def_ro("constraint_force", &ForwardResult::constraint_force,
               "(..., unknowns) of A f = b, or None.")
-      .def_ro("report", &ForwardResult::report);
+      .def_ro("report", &ForwardResult::report)
+      .def("__getstate__",
+           [](const ForwardResult& r) {
+             return ForwardState(r.acceleration, r.joint_load, r.constraint_force,
+                                 state_of(r.report));
+           })
+      .def("__setstate__", [](ForwardResult& r, const ForwardState& state) {
+        const auto& [acceleration, joint_load, constraint_force, report] = state;
+        new (&r) ForwardResult{acceleration, joint_load, constraint_force, report_of(report)};
+      });
 }
 
 void bind_forward(nb::module_& m) {

@@ -5,6 +5,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 
 #include "arrays.hpp"
 #include "bind.hpp"
@@ -362,6 +363,14 @@ void bind_system(nb::module_& m) {
       .def_ro("largest", &Spectrum::largest)
       .def_ro("steps", &Spectrum::steps, "Lanczos steps taken.")
       .def_ro("converged", &Spectrum::converged)
+      .def(
+          "__getstate__",
+          [](const Spectrum& s) { return std::tuple(s.smallest, s.largest, s.steps, s.converged); })
+      .def("__setstate__",
+           [](Spectrum& s, const std::tuple<double, double, int, bool>& state) {
+             const auto& [smallest, largest, steps, converged] = state;
+             new (&s) Spectrum{smallest, largest, steps, converged};
+           })
       .def_prop_ro("condition", &Spectrum::condition)
       .def_prop_ro("radius", &Spectrum::radius, "Spectral radius of Jacobi's 1 - D^-1 A.");
   nb::class_<PyConstraintSystem>(

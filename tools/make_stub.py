@@ -33,6 +33,7 @@ ARRAYS = (
     "target tau times translation v v0 value values"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
+    "arg": "Any",  # without a name: what pickling has kept
     "axes": "Any",  # joint axes: one per direction, or none
     "body": "str | int",
     "fn": "Callable[..., Any]",

@@ -13,8 +13,10 @@ import linkwise as lw
 
 
 def fail(output=None):
-    """A simulation that cannot be as accurate as it is asked to be."""
-    return lw.simulate(lw.scenes.chain(2), duration=1, q0=[1, 1], tolerance=1e-16, output=output)
+    """A simulation that needs more steps than it may take."""
+    return lw.simulate(
+        lw.scenes.chain(2), duration=1, q0=[1, 1], numerics={"max_steps": 1}, output=output
+    )
 
 
 def refuse():
@@ -84,3 +86,30 @@ def test_executor_hands_the_exception_over():
     ):
         pool.submit(fail).result(timeout=120)
     assert info.value.run.sizes["time"] == 1
+
+
+def values_of(result):
+    """The public properties of a result of the core, arrays as lists."""
+    found = {n: getattr(result, n) for n in dir(result) if not n.startswith("_")}
+    return {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in found.items()}
+
+
+@pytest.mark.parametrize(
+    "again", [lambda e: pickle.loads(pickle.dumps(e)), copy.copy, copy.deepcopy]
+)
+def test_results_of_the_core_round_trip(again):
+    model = lw.scenes.chain(3)
+    full = lw.forward_dynamics(
+        model, [0.1, 0.2, 0.3], [1, 2, 3], method="constraint_force", full=True
+    )
+    builder = lw.ModelBuilder("m")
+    for name in "ab":
+        builder.add_link(name, mass=1.0, inertia=np.eye(3))
+    builder.add_joint("weld", "fixed", "a", "b")
+    (note, *_) = builder.build().notes
+    back = again(full)
+    assert repr(back.report) == repr(full.report)
+    for result in (full.report, note, lw.ConstraintSystem(model, [0, 0, 0]).spectrum()):
+        assert values_of(again(result)) == values_of(result)
+    for name in ("acceleration", "joint_load", "constraint_force"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(full, name))

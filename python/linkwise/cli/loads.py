@@ -59,7 +59,6 @@ def loads(
     as_json: JsonOption = False,
 ) -> None:
     """Peak loads of every joint of a RUN: with bounds, by cause, against ratings."""
-    from linkwise.io.load import load
     from linkwise.io.writing import check_file
     from linkwise.loads.samples import joint_position
     from linkwise.results import open_run
@@ -70,7 +69,7 @@ def loads(
     opened = open_run(run)
     for name in joint or ():
         joint_position(opened, name)
-    machine = load(model, mimic="independent") if model is not None else opened.load_model()
+    machine = machine_of(opened, model)
     found = collect(opened, machine, rating_tables(opened, ratings), certify, as_json)
     shares = peak_shares(opened, machine, found["summary"], split) if split else []
     records = peak_records(found, joint)
@@ -89,6 +88,21 @@ def loads(
     for path in (csv, html):
         if path is not None:
             screen.print(f"Written: {path}", markup=False)
+
+
+def machine_of(run: Run, file: Path | None) -> Model:
+    """The machine of the run itself, of a file only where the run does not hold it."""
+    from linkwise.cli.output import say
+    from linkwise.io.load import load
+    from linkwise.loads.samples import held_model, model_of
+
+    own = held_model(run)
+    if file is None:
+        return run.load_model()
+    if own is not None:
+        say(f"{file}: is not used, the run holds the model that it was made with")
+        return own
+    return model_of(run, load(file, mimic="independent"))
 
 
 def rating_tables(run: Run, path: Path | None) -> dict[str, Rating]:
@@ -258,13 +272,17 @@ def _all_joints(records: list[dict[str, Any]]) -> Any:
         title += f" (the {_MOST_JOINTS} largest forces of {len(by_joint)} joints)"
     shown = [name for name in _SHOWN if any(name in found for _, found in rows)]
     units = {r["quantity"]: r["unit"] for r in records}
-    headings = [(f"{name.replace('_', ' ')} [{units[name]}]", "right") for name in shown]
-    result = table(title, [("joint", "left"), ("at [s]", "right"), *headings])
+    headings = [(f"{name.replace('_', ' ')} [{units[name]}] @ s", "right") for name in shown]
+    result = table(title, [("joint", "left"), *headings])
     for name, found in rows:
-        when = number(found["force"]["peak_time"])
-        cells = [_with_bound(found[q]) if q in found else "" for q in shown]
-        result.add_row(text(name), when, *cells)
+        cells = [_at_its_time(found[q]) if q in found else "" for q in shown]
+        result.add_row(text(name), *cells)
     return result
+
+
+def _at_its_time(record: dict[str, Any]) -> str:
+    """A peak and when: every quantity has its own time."""
+    return f"{_with_bound(record)} @ {number(record['peak_time'])}"
 
 
 def _joint_table(records: list[dict[str, Any]], joint: str) -> Any:
@@ -287,7 +305,7 @@ def _joint_table(records: list[dict[str, Any]], joint: str) -> Any:
 
 def _margin_table(rated: list[dict[str, Any]]) -> Any:
     headings = [("joint", "left"), ("quantity", "left")]
-    headings += [(name, "right") for name in ("peak", "rating", "use", "margin")]
+    headings += [(name, "right") for name in ("peak", "at [s]", "rating", "use", "margin")]
     result = table("Against the ratings; the bounds of certified peaks count as load", headings)
     for record in sorted(rated, key=lambda r: -r["use"]):
         style = "red" if record["margin"] < 0 else ""
@@ -295,6 +313,7 @@ def _margin_table(rated: list[dict[str, Any]]) -> Any:
             text(record["joint"]),
             f"{record['quantity'].replace('_', ' ')} [{record['unit']}]",
             _with_bound(record),
+            number(record["peak_time"]),
             number(record["rating"]),
             f"{100 * record['use']:.1f} %",
             f"{100 * record['margin']:.1f} %",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import warnings
@@ -64,7 +65,8 @@ def _complain(message: str, code: int) -> int:
     """One line on stderr; with --json also an object on stdout, which is never left empty."""
     line = say(message)
     if "--json" in sys.argv[1:]:
-        print_json({"error": line, "exit_code": code})
+        with contextlib.suppress(BrokenPipeError):
+            print_json({"error": line, "exit_code": code})
     return code
 
 
@@ -91,6 +93,11 @@ def _exit_code() -> int:
             print(error, file=sys.stderr)
             return WRONG_INPUT
         return _complain(_usage_message(error), WRONG_INPUT)
+    except SystemExit as error:
+        # Typer's answer to a pipe that nobody reads is an exit with 1.
+        if isinstance(error.__context__, BrokenPipeError):
+            raise BrokenPipeError from None
+        raise
     except KeyboardInterrupt as error:
         return _complain(str(error) or "interrupted", FAILED)
     except Exception as error:
@@ -110,15 +117,29 @@ def _warn(message: Warning | str, *_: object, **__: object) -> None:
     say(f"warning: {message}")
 
 
+def _open_standard_streams() -> None:
+    """Streams that the caller closed (`linkwise ... >&-`) lead nowhere.
+
+    Otherwise the next file that is opened would get their number, and messages would go into it.
+    """
+    while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(handle)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+
+
 def main() -> NoReturn:
     """Run the command line of this process and exit."""
+    _open_standard_streams()
     warnings.showwarning = _warn
-    try:
+    code = DONE  # the reader of a pipe went away (`linkwise inspect x | head`): not a failure
+    with contextlib.suppress(BrokenPipeError):
         code = _exit_code()
+    try:
         sys.stdout.flush()
     except BrokenPipeError:
-        # The reader of a pipe went away (`linkwise inspect x | head`): not a failure, and Python
-        # must not complain about it while it closes stdout.
+        # Python must not complain about it while it closes stdout.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = DONE
     sys.exit(code)

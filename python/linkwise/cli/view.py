@@ -42,8 +42,8 @@ def view(
         Path | None,
         typer.Option(
             "--model",
-            help="The file of a run's model, for its meshes. By default the file of that name "
-            "beside the run or in this folder.",
+            help="The file of a run's model, for its meshes; masses and joints are the run's own. "
+            "By default the file of that name beside the run or in this folder.",
             show_default=False,
         ),
     ] = None,

@@ -9,6 +9,7 @@ import re
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +43,7 @@ class CsvTable:
 
     def index(self, name: str) -> int:
         """The position of a column among ``names``."""
-        if name not in self.names:
+        if name not in self._positions:
             complain(
                 self.path,
                 f"column '{shorten(name)}'",
@@ -50,7 +51,11 @@ class CsvTable:
                 near(name, self.names, "the columns are"),
                 1,
             )
-        return self.names.index(name)
+        return self._positions[name]
+
+    @cached_property
+    def _positions(self) -> dict[str, int]:
+        return {name: k for k, name in enumerate(self.names)}
 
 
 def read_table(path: str | os.PathLike[str]) -> CsvTable:
@@ -141,6 +146,7 @@ def _header(
     path: str | os.PathLike[str], line: int, cells: Sequence[str]
 ) -> tuple[list[str], list[Unit | None]]:
     names: list[str] = []
+    known: set[str] = set()
     units: list[Unit | None] = []
     for number, cell in enumerate(cells, 1):
         match = _HEADER.match(cell.strip()) if len(cell) <= 1000 else None
@@ -152,11 +158,12 @@ def _header(
             unit = parse_unit(match.group(2)) if match else None
         except ValueError as error:
             complain(path, f"{element} '{shorten(name)}'", str(error), "use one of them", line)
-        if name in names:
+        if name in known:
             complain(
                 path, f"{element} '{shorten(name)}'", "the name is used twice", "rename one", line
             )
         names.append(name)
+        known.add(name)
         units.append(unit)
     clocks = [i for i, name in enumerate(names) if name in _TIME_NAMES]
     if len(clocks) != 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise import base
-from linkwise._core import InputError
+from linkwise._core import InputError, inverse_dynamics_loads, passive_torque
 from linkwise.base import Array
 from linkwise.io.complaint import near
 
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
+
+
+_SAME = 1e-9  # loads of the same motion that differ by less belong to the same machine
 
 
 class RunLike(Protocol):
@@ -62,15 +66,63 @@ def joint_position(run: RunLike, joint: str) -> int:
 
 
 def model_of(run: RunLike, model: Model | None) -> Model:
-    """The machine of the run: the one given, checked, or the one inside the run."""
-    if model is None:
+    """The machine of the run: the one given, checked, or the one inside the run.
+
+    A model with other masses, frames or joint properties is refused where the run can tell; a run
+    that does not hold its model is told apart by its hash alone, which is a warning, because a
+    newer linkwise may describe the same machine differently.
+    """
+    own = held_model(run)
+    if model is None or model is own:
         return run.load_model()
     attrs = run.dataset.attrs
     size = {"model_joints": model.n_joints, "model_degrees_of_freedom": model.nv}
     same = all(attrs.get(name, count) == count for name, count in size.items())
-    if not (same and set(joint_names(run)) <= set(model.joint_names)):
+    recorded = run.dataset.coords.get("joint")
+    names = set() if recorded is None else {str(name) for name in recorded.values}
+    if not (same and names <= set(model.joint_names)):
         raise InputError("model: is not the one that the run was made with; give that one")
+    if own is None and model.hash != attrs.get("model_hash", model.hash):
+        warnings.warn(
+            "model: its hash is not that of the model that the run was made with; loads that are "
+            "computed again are right only if it is the same machine",
+            UserWarning,
+            stacklevel=2,
+        )
+    if own is not None and not _move_alike(model, own):
+        raise InputError(
+            "model: is not the one that the run was made with, its masses, frames or joint "
+            "properties differ; leave it out, the run holds its own"
+        )
     return model
+
+
+def _move_alike(one: Model, other: Model) -> bool:
+    """Whether two machines with the same joints need the same loads for the same motion.
+
+    An arbitrary motion at one pose shows every mass, inertia, frame and joint property. Hashes
+    would tell apart what differs in the last bit.
+    """
+    if one.hash == other.hash:
+        return True
+    if one.joint_names != other.joint_names or one.joint_types != other.joint_types:
+        return False
+    v, a = np.random.default_rng(1).normal(size=(2, one.nv))
+    loads = []
+    for model in (one, other):
+        q = one.neutral_configuration()
+        wrenches = inverse_dynamics_loads(model, q, v, a).ravel()
+        loads.append(np.concatenate([wrenches, passive_torque(model, q, v).ravel()]))
+    size = np.abs(loads).max(initial=0.0)
+    return bool(np.abs(loads[0] - loads[1]).max(initial=0.0) <= _SAME * size)
+
+
+def held_model(run: RunLike) -> Model | None:
+    """The machine inside the run, None where it holds none that can be read."""
+    try:
+        return run.load_model()
+    except InputError:
+        return None
 
 
 @dataclass(frozen=True)

@@ -230,7 +230,7 @@ def write_report(
         "joints": joint_figures(run, drawn, every, model),
         "energy": energy_figure(run, every, model),
     }
-    chooser = "".join(f"<option>{escape(name)}</option>" for name in drawn)
+    chooser = "".join(f"<option value='{escape(name)}'>{escape(name)}</option>" for name in drawn)
     title = escape(f"Joint loads of {run.dataset.attrs.get('model', 'a machine')}")
     fewer = (
         f" of the {len(drawn)} most loaded of {len(names)} joints"

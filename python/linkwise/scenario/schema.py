@@ -269,6 +269,7 @@ class SimulateSection(Section):
     max_iterations: Annotated[int, Field(ge=1)] | None = None
     step: Time | None = None
     max_step: Time | None = None
+    max_steps: Annotated[int, Field(ge=1, lt=2**31)] | None = None
     threads: Annotated[int, Field(ge=1)] | None = None
 
 

@@ -26,6 +26,7 @@ class Numerics:
     integrator: str | None = None
     step: float | None = None
     max_step: float | None = None
+    max_steps: int | None = None
     method: str | None = None
     solver: str | None = None
     initial_guess: str | None = None

@@ -158,6 +158,7 @@ def run_time_loop(
                     recorded += len(chunk["time"])
                 if len(chunk["time"]):
                     reached = float(chunk["time"][-1])
+                if len(chunk["time"]) or simulation.ending.outcome == "too_many_steps":
                     counters = {name: getattr(simulation.statistics, name) for name in COUNTERS}
                 ended = simulation.ending
                 if ended.outcome == "interrupted":

@@ -15,7 +15,7 @@ from linkwise.base import Array, rows_per_block
 from linkwise.io.complaint import near
 from linkwise.io.load import load
 from linkwise.io.urdf_visuals import Appearance, read_appearance
-from linkwise.loads.samples import rows
+from linkwise.loads.samples import held_model, model_of, rows
 from linkwise.record.machine import read_model
 from linkwise.results import Run, open_run
 from linkwise.scenario import load_ratings, load_scenario, ratings_in
@@ -31,9 +31,9 @@ PathLike = str | os.PathLike[str]
 class Options:
     """How to find a model and its appearance.
 
-    model: file to take model or appearance from instead of the run's own; package_dirs,
-    floating_base: as in linkwise.load; loads: whether joint loads are shown; ratings: a file of
-    them instead of the scenario's; causes: only the loads that these cause.
+    model: file that says how a run's machine looks, and what it is where the run does not hold it;
+    package_dirs, floating_base: as in linkwise.load; loads: whether joint loads are shown; ratings:
+    a file of them instead of the scenario's; causes: only the loads that these cause.
     """
 
     model: Path | None = None
@@ -187,8 +187,11 @@ def _load_model(path: Path, options: Options) -> tuple[Model, Path | None, Seque
 def _open_run(path: Path, options: Options) -> Source:
     run = open_run(path)
     if options.model is not None:
-        model, file, package_dirs = _load_model(options.model, options)
-        _check_same_machine(run, model, options.model)
+        # The file says how the machine looks. What it weighs and how it moves says the run: a
+        # payload or other masses of its scenario are not in the file.
+        drawn, file, package_dirs = _load_model(options.model, options)
+        _check_same_machine(run, drawn, options.model)
+        model = held_model(run) or model_of(run, drawn)
     else:
         model, package_dirs = read_model(path), options.package_dirs
         file = _file_beside(path, str(run.dataset.attrs.get("model_source", "")))

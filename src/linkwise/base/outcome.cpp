@@ -28,7 +28,7 @@ constexpr OutcomeEntry table[] = {
      "look for a jump in a drive or a singular motion at this time, loosen the tolerance, or try "
      "bdf"},
     {Outcome::too_many_steps, "too_many_steps", "the allowed number of steps is used up",
-     "loosen the tolerance, or try bdf if the system is stiff"},
+     "allow more by max_steps, loosen the tolerance, or try bdf if the system is stiff"},
     {Outcome::interrupted, "interrupted", "it was interrupted", "start it again"},
 };
 

@@ -17,6 +17,7 @@ constexpr NumericsEntry table[] = {
     {"step", &Numerics::step, "step of the fixed-step integrators, s"},
     {"max_step", &Numerics::max_step,
      "longest step of the others, s; with given motions a fiftieth of the duration by default"},
+    {"max_steps", &Numerics::max_steps, "most steps of the whole run; no bound by default"},
     {"method", &Numerics::method,
      "how accelerations are computed: auto, or one of linkwise.methods()"},
     {"solver", &Numerics::solver,
@@ -75,6 +76,7 @@ SimulationOptions simulation_options(const Numerics& n, const Executor& executor
   o.integration.tolerance = allowed_per_step;
   o.integration.step = n.step.value_or(0.0);
   o.integration.max_step = n.max_step.value_or(0.0);
+  o.integration.max_steps = n.max_steps.value_or(0);
   return o;
 }
 

@@ -21,7 +21,7 @@ struct Numerics {
   std::string initial_guess = "cubic";
   std::string stop = "energy_norm";
   std::optional<double> solver_tolerance;
-  std::optional<int> max_iterations;
+  std::optional<int> max_iterations, max_steps;
   std::string state = "joint_rates";
 };
 

@@ -37,10 +37,34 @@ def test_table(linkwise, run):
     result = linkwise("loads", run)
     assert result.code == 0
     assert "elbow" in result.out
-    assert "axial [N]" in result.out
-    assert "at [s]" in result.out
+    assert "axial [N] @ s" in result.out
     assert "Against the ratings" in result.out
     assert "±" not in result.out
+
+
+def test_every_peak_has_its_own_time(linkwise, run):
+    """Force and tilting moment peak at different instants, and the row says both."""
+    summary = lw.loads.summary(lw.open_run(run))
+    times = {float(t) for t in summary.peak_time.sel(joint="elbow").values if np.isfinite(t)}
+    assert len(times) > 1
+    lines = linkwise("loads", run).out.splitlines()
+    row = next(line for line in lines if line.split()[:1] == ["elbow"])
+    for quantity in ("force", "moment", "tilting_moment"):
+        one = summary.sel(joint="elbow", quantity=quantity)
+        assert f"{float(one.peak):.4g} @ {float(one.peak_time):.4g}" in row
+    rated = next(line for line in lines if "radial [N]" in line and "elbow" in line)
+    radial = summary.sel(joint="elbow", quantity="radial")
+    assert f"{float(radial.peak_time):.4g}" in rated.split()
+
+
+def test_a_model_file_does_not_replace_the_run_s_own(linkwise, scenario):
+    """The scenario's payload is not in the file; loads by cause need it."""
+    loaded = scenario(("[simulate]", '[payload.box]\nlink = "upper"\nmass = 5\n[simulate]'))
+    assert linkwise("run", loaded, "-o", "run.zarr").code == 0
+    plain = linkwise("loads", "run.zarr", "--split", "motion", "--json")
+    given = linkwise("loads", "run.zarr", "--split", "motion", "--json", "--model", "arm.urdf")
+    assert given.json == plain.json
+    assert "arm.urdf: is not used, the run holds the model" in given.complaint
 
 
 def test_json_is_the_summary(linkwise, run):

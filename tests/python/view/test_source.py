@@ -155,3 +155,43 @@ def test_scenario_finds_the_appearance_of_its_file(urdf, tmp_path):
     path = Path(tmp_path / "swing.toml")
     path.write_text('model = "arm.urdf"\n[simulate]\nduration = 1\n')
     assert len(open_source(path, Options()).appearance.visuals) == 2
+
+
+def payload_run(urdf, tmp_path):
+    """A run of the arm with 5 kg more than its file has."""
+    model = lw.load(urdf).with_payload("upper", mass=5.0)
+    lw.simulate(model, duration=0.1, q0=[0.3], output=tmp_path / "run.zarr")
+    return model
+
+
+def test_a_model_file_gives_meshes_alone(urdf, tmp_path):
+    model = payload_run(urdf, tmp_path)
+    source = open_source(tmp_path / "run.zarr", Options(model=urdf))
+    assert source.model.total_mass == model.total_mass == lw.load(urdf).total_mass + 5
+    assert len(source.appearance.visuals) == len(read_appearance(urdf, []).visuals)
+    run = lw.open_run(tmp_path / "run.zarr")
+    recording = source.recording
+    recording.causes.choose(["gravity"])
+    recording.causes.choose(recording.causes.names)
+    np.testing.assert_allclose(
+        recording.causes.load(3), run.joint_load[3].values, rtol=1e-9, atol=1e-9
+    )
+
+
+def test_a_run_without_its_model_takes_the_file_s_with_a_warning(urdf, tmp_path):
+    payload_run(urdf, tmp_path)
+    shutil.rmtree(tmp_path / "run.zarr" / GROUP)
+    shutil.rmtree(tmp_path / "run.zarr" / "files")
+    with pytest.warns(UserWarning, match="its hash is not that of the model that the run was made"):
+        source = open_source(tmp_path / "run.zarr", Options(model=urdf))
+    assert source.model.total_mass == lw.load(urdf).total_mass
+
+
+def test_loads_of_another_machine_are_refused(urdf, tmp_path):
+    payload_run(urdf, tmp_path)
+    run = lw.open_run(tmp_path / "run.zarr")
+    with pytest.raises(lw.InputError, match="masses, frames or joint properties differ; leave it"):
+        lw.loads.split(run, "force", lw.load(urdf))
+    held = run.load_model()
+    again = lw.loads.split(lw.open_run(tmp_path / "run.zarr"), "force", held)
+    assert again.identical(lw.loads.split(run, "force"))
