@@ -72,11 +72,11 @@ def check_file(path: str | os.PathLike[str]) -> None:
 
 
 @contextmanager
-def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+def written_whole(path: str | os.PathLike[str], expected_bytes: int = 0) -> Iterator[Path]:
     """A name to write to, whose content gets to `path` when all went well: never half a file.
 
     A regular file is replaced, also at the end of a link. A character device or a pipe with a
-    reader is written into.
+    reader is written into. `expected_bytes` must be free, for libraries that crash on a full disk.
 
     Raises:
         InputError: something else stands there, or it cannot be written.
@@ -86,10 +86,12 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         if target.is_stream:
             with tempfile.TemporaryDirectory(prefix="linkwise-") as folder:
                 whole = Path(folder) / (target.path.name or "file")
+                _check_room(target, Path(folder), expected_bytes)
                 yield whole
                 _pour(whole, target)
             return
         aside = target.path.with_name(f".{target.path.name}.{secrets.token_hex(4)}.new")
+        _check_room(target, target.path.parent, expected_bytes)
         try:
             yield aside
             with suppress(FileNotFoundError):
@@ -99,6 +101,14 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
             aside.unlink(missing_ok=True)
     except OSError as error:
         raise target.error(f"cannot be written ({_reason(error)})") from error
+
+
+def _check_room(target: _Target, folder: Path, expected: int) -> None:
+    free = shutil.disk_usage(folder).free
+    if expected > free:
+        raise target.error(
+            f"cannot be written (it takes {expected / 1e6:.0f} MB, {free / 1e6:.0f} MB are free)"
+        )
 
 
 def _pour(whole: Path, target: _Target) -> None:

@@ -18,6 +18,8 @@ from linkwise.io.writing import csv_cell, written_whole
 if TYPE_CHECKING:
     import xarray as xr
 
+_NETCDF_HEAD = 1 << 17  # of names and attributes
+
 # Scalars of one kind share a table.
 _TOGETHER = {
     "energy": ("kinetic_energy", "potential_energy"),
@@ -37,7 +39,9 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     import h5netcdf
 
     target = Path(os.path.abspath(path))
-    with written_whole(path) as aside, h5netcdf.File(aside, "w") as file:
+    # HDF5 that finds no room leaves the process in a state in which it crashes later.
+    size = sum(variable.nbytes for variable in dataset.variables.values()) + _NETCDF_HEAD
+    with written_whole(path, size) as aside, h5netcdf.File(aside, "w") as file:
         file.dimensions = {str(name): size for name, size in dataset.sizes.items()}
         file.attrs.update(dataset.attrs)
         for name, variable in dataset.variables.items():

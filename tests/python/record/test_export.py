@@ -63,3 +63,14 @@ def test_names_are_no_formulas(tmp_path):
         head, *rows = csv.reader(file)
     assert head == ["time [s]", '\'=HYPERLINK("x") [rad]', "'+b [rad]", "c [rad]"]
     np.testing.assert_array_equal(np.array(rows, dtype=float)[:, 1:], run.position)
+
+
+def test_a_file_that_does_not_fit_is_refused_before_it_is_begun(tmp_path, run, monkeypatch):
+    """HDF5 would crash the process later."""
+    import shutil
+
+    whole = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: whole._replace(free=100_000))
+    with pytest.raises(lw.InputError, match=r"\(it takes \d+ MB, 0 MB are free\)"):
+        run.to_netcdf(tmp_path / "a.nc")
+    assert os.listdir(tmp_path) == []
