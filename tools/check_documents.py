@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from source_text import tracked_files
+from source_text import run_check
 
 FENCE = re.compile(r"^(```|~~~).*?^\1\s*$", re.MULTILINE | re.DOTALL)
 CODE = re.compile(r"`[^`\n]*`")
@@ -77,13 +77,5 @@ def check(root: Path, paths: list[str]) -> list[str]:
     ]
 
 
-def main() -> int:
-    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent
-    violations = check(root, tracked_files(root))
-    print(*violations, sep="\n", end="\n" if violations else "")
-    print(f"check_documents: {len(violations)} violations")
-    return 1 if violations else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_check("check_documents", check))

@@ -24,6 +24,7 @@ from import_graph import (
     late_imports,
     rooms,
 )
+from source_text import report
 
 #: What each layer may include besides itself. Two columns, numerics and mechanics, meet in
 #: dynamics: solve never sees a mechanism, constraint fills the systems of linear without solving.
@@ -201,9 +202,7 @@ def main() -> int:
         *check_hidden_imports(root),
         *check_picture(root),
     ]
-    print(*violations, sep="\n", end="\n" if violations else "")
-    print(f"check_layers: {len(violations)} violations")
-    return 1 if violations else 0
+    return report("check_layers", violations)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from source_text import tracked_files
+from source_text import run_check
 
 BIBLIOGRAPHY = "references.bib"
 KEY = re.compile(r"[a-z]+(?:1[6-9]|20)\d\d[a-z]?")
@@ -67,13 +67,5 @@ def check(root: Path, paths: list[str]) -> list[str]:
     return violations
 
 
-def main() -> int:
-    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent
-    violations = check(root, tracked_files(root))
-    print(*violations, sep="\n", end="\n" if violations else "")
-    print(f"check_references: {len(violations)} violations")
-    return 1 if violations else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_check("check_references", check))

@@ -15,7 +15,7 @@ import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
-from source_text import CPP, cpp_code, prose, tracked_files
+from source_text import CPP, cpp_code, prose, run_check
 
 #: A file with a name of its own. Placeholders are written in capitals: NAME.hpp.
 FILE = re.compile(r"(?<![\w./*{<-])((?:[\w.-]+/)*[a-z_][\w-]*\.(?:hpp|cpp|py|md|cmake|bib))\b(?!/)")
@@ -129,13 +129,5 @@ def check(root: Path, paths: list[str]) -> list[str]:
     return violations
 
 
-def main() -> int:
-    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent
-    violations = check(root, tracked_files(root))
-    print(*violations, sep="\n", end="\n" if violations else "")
-    print(f"check_words: {len(violations)} violations")
-    return 1 if violations else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_check("check_words", check))

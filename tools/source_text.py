@@ -1,11 +1,13 @@
-"""What the checks read in a source file: its code without comments, its comments without code."""
+"""What the checks share: the text of sources by code and by comments, and how they report."""
 
 from __future__ import annotations
 
 import io
 import re
 import subprocess
+import sys
 import tokenize
+from collections.abc import Callable
 from pathlib import Path
 
 CPP = {".cpp", ".hpp", ".cu", ".h"}
@@ -24,6 +26,18 @@ def tracked_files(root: Path) -> list[str]:
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     output = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True).stdout
     return sorted(name for name in output.split("\0") if name and (root / name).is_file())
+
+
+def run_check(name: str, check: Callable[[Path, list[str]], list[str]]) -> int:
+    """Prints what a check finds in the repository given, or in this one; the exit status."""
+    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent
+    return report(name, check(root, tracked_files(root)))
+
+
+def report(name: str, violations: list[str]) -> int:
+    print(*violations, sep="\n", end="\n" if violations else "")
+    print(f"{name}: {len(violations)} violations")
+    return 1 if violations else 0
 
 
 def blanked(text: str) -> str:

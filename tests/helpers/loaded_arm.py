@@ -1,4 +1,4 @@
-"""A small arm that loads its joints in every way, and a smooth motion for it."""
+"""A small arm that loads its joints in every way, a smooth motion for it, and a run of both."""
 
 import numpy as np
 
@@ -43,3 +43,16 @@ def profile(end, duration, rows=201):
     times = np.linspace(0, duration, rows)
     phase = 2 * np.pi * times / duration
     return lw.Table(times, end * (times / duration - np.sin(phase) / (2 * np.pi)), "cubic")
+
+
+def swing(**options):
+    """A run with every cause: a given motion, a torque, a wrench, damping, spring and stop."""
+    return lw.simulate(
+        arm(),
+        duration=1.0,
+        every=0.01,
+        drives={"shoulder": lw.Motion(profile(0.8, 1.0)), "elbow": 3.0},
+        wrenches={"hand": lw.Wrench([5.0, -3.0, 2.0, 0.1, 0.2, -0.3])},
+        q0=[0, 0.3, 0.25],
+        **options,
+    )

@@ -151,6 +151,17 @@ def check_derivatives(motion: Callable[[float], Any], times: Array) -> Array:
     return values[:, 0]
 
 
+def _hand_over(simulation: Any, setter: str, name: str, value: Any, **more: Any) -> None:
+    """Give the core simulation a table, a function or constants: it has a setter for each."""
+    if isinstance(value, Table):
+        set_table = getattr(simulation, f"{setter}_table")
+        set_table(name, value.times, value.values, interpolation=value.interpolation, **more)
+    elif callable(value):
+        getattr(simulation, f"{setter}_callable")(name, value, **more)
+    else:
+        getattr(simulation, setter)(name, value, **more)
+
+
 class Drive(ABC):
     """What moves or holds one joint."""
 
@@ -177,15 +188,7 @@ class Torque(Drive):
             object.__setattr__(self, "value", np.atleast_1d(_finite(self.value, "torque")))
 
     def apply(self, simulation: Any, joint: str) -> None:
-        if isinstance(self.value, Table):
-            table = self.value
-            simulation.drive_torque_table(
-                joint, table.times, table.values, interpolation=table.interpolation
-            )
-        elif callable(self.value):
-            simulation.drive_torque_callable(joint, self.value)
-        else:
-            simulation.drive_torque(joint, self.value)
+        _hand_over(simulation, "drive_torque", joint, self.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,13 +299,7 @@ class Motion(Drive):
             )
 
     def apply(self, simulation: Any, joint: str) -> None:
-        if isinstance(self.value, Table):
-            table = self.value
-            simulation.drive_motion_table(
-                joint, table.times, table.values, interpolation=table.interpolation
-            )
-        else:
-            simulation.drive_motion_callable(joint, self.value)
+        _hand_over(simulation, "drive_motion", joint, self.value)
 
 
 @dataclass(frozen=True)
@@ -347,19 +344,7 @@ class Wrench:
 
     def apply(self, simulation: Any, body: str) -> None:
         """Set this wrench on ``body`` of a ``_core.Simulation``."""
-        if isinstance(self.value, Table):
-            table = self.value
-            simulation.wrench_table(
-                body,
-                table.times,
-                table.values,
-                interpolation=table.interpolation,
-                frame=self.frame,
-            )
-        elif callable(self.value):
-            simulation.wrench_callable(body, self.value, frame=self.frame)
-        else:
-            simulation.wrench(body, self.value, frame=self.frame)
+        _hand_over(simulation, "wrench", body, self.value, frame=self.frame)
 
 
 def as_drive(value: Any) -> Drive:

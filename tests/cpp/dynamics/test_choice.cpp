@@ -1,9 +1,9 @@
 // Which method "auto" picks, and what each refuses.
-#include <functional>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "base/error_of.hpp"
 #include "dynamics/dynamics_case.hpp"
 #include "linkwise/base/error.hpp"
 #include "linkwise/solve/registry.hpp"
@@ -12,15 +12,6 @@ namespace linkwise::testing {
 namespace {
 
 using enum JointType;
-
-std::string error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 DynamicsOptions with_method(const std::string& method) {
   DynamicsOptions options;

@@ -190,13 +190,7 @@ TEST(Evaluator, LoadsByCauseAddUp) {
 }
 
 TEST(Evaluator, FailuresNameTheMethodTheBodyAndTheRemedy) {
-  ModelSpec spec;
-  spec.links = {{"base", 0, {}, {}}, {"arm", 1, {0.5, 0, 0}, {}}, {"tip", 1, {0, 0, 0}, {}}};
-  Draws draws(1);
-  for (int i = 0; i < 2; ++i)
-    spec.joints.push_back(random_joint(revolute, "hinge" + std::to_string(i), spec.links[i].name,
-                                       spec.links[i + 1].name, draws));
-  const Model m(spec);
+  const Model m(singular_spec());
   for (const size_t count : {size_t{1}, size_t{2}}) {
     const Evaluated got(m, count, asking_for("auto"));
     EXPECT_EQ(got.report.outcome, Outcome::not_positive_definite);

@@ -137,6 +137,17 @@ inline ModelSpec stacked_spec(Draws& draws) {
   return spec;
 }
 
+/// Two hinges and point masses: the outer one has no inertia about its axis.
+inline ModelSpec singular_spec() {
+  ModelSpec spec;
+  spec.links = {{"base", 0, {}, {}}, {"arm", 1, {0.5, 0, 0}, {}}, {"tip", 1, {0, 0, 0}, {}}};
+  Draws draws(1);
+  for (int i = 0; i < 2; ++i)
+    spec.joints.push_back(random_joint(JointType::revolute, "hinge" + std::to_string(i),
+                                       spec.links[i].name, spec.links[i + 1].name, draws));
+  return spec;
+}
+
 inline std::vector<Machine> special_machines(Draws& draws) {
   using enum JointType;
   const std::vector<JointType> mixed{revolute, universal, spherical, prismatic, composite,

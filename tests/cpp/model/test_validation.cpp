@@ -1,5 +1,4 @@
 // Every message that a wrong model gets, word for word.
-#include <functional>
 #include <limits>
 #include <ostream>
 #include <string>
@@ -7,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/error_of.hpp"
 #include "linkwise/base/error.hpp"
 #include "linkwise/model/model.hpp"
 #include "linkwise/model/validate.hpp"
@@ -38,15 +38,6 @@ ModelSpec arm() {
   spec.joints = {joint("shoulder", JointType::revolute, "base", "upper"),
                  joint("elbow", JointType::spherical, "upper", "lower")};
   return spec;
-}
-
-std::string error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 struct Wrong {

@@ -1,9 +1,9 @@
 // Why runs stop or do not start, and what is said about it.
-#include <functional>
 #include <limits>
 
 #include <gtest/gtest.h>
 
+#include "base/error_of.hpp"
 #include "linkwise/base/error.hpp"
 #include "simulate/recording.hpp"
 
@@ -136,15 +136,6 @@ TEST(Stops, ABodyThatNothingResistsIsNamed) {
   EXPECT_EQ(run(simulation, {0, 1}).size(), 0u);
   EXPECT_EQ(simulation.ending().outcome, Outcome::not_positive_definite);
   EXPECT_EQ(simulation.ending().joint, 0);
-}
-
-std::string error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 TEST(Refused, EachWithOneLine) {

@@ -1,16 +1,13 @@
-"""A short run of the Shuttle's arm, the command line in this process, and a browser."""
+"""A short run of the Shuttle's arm, and a browser."""
 
 import os
 import shutil
-import sys
 import threading
-from dataclasses import dataclass
 
 import pytest
 
 import linkwise as lw
 from helpers.browser import CHROMIUM_ARGUMENTS, CHROMIUMS, PATIENCE, WINDOW
-from linkwise import cli
 
 START = (0.0, -0.3, 0.5, -0.2, 0.15, 0.0)
 DURATION = 2.0
@@ -42,26 +39,6 @@ def ratings_path(tmp_path_factory):
     path = tmp_path_factory.mktemp("ratings") / "ratings.toml"
     path.write_text("[rating.shoulder_yaw]\nforce = 1\n")
     return path
-
-
-@dataclass
-class Result:
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def linkwise(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["linkwise", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        return Result(caught.value.code, *capsys.readouterr())
-
-    return call
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
-from helpers.loaded_arm import arm, profile
+from helpers.loaded_arm import arm, swing
 from linkwise.view.arrows import colors_of_use
 from linkwise.view.export import write_html
 from linkwise.view.shown_loads import RatingUse, rating_use
@@ -20,15 +20,7 @@ from linkwise.view.source import Options, open_source
 def loaded_path(tmp_path_factory):
     """A run with every cause."""
     path = tmp_path_factory.mktemp("run") / "loaded.zarr"
-    lw.simulate(
-        arm(),
-        duration=1.0,
-        every=0.01,
-        drives={"shoulder": lw.Motion(profile(0.8, 1.0)), "elbow": 3.0},
-        wrenches={"hand": lw.Wrench([5.0, -3.0, 2.0, 0.1, 0.2, -0.3])},
-        q0=[0, 0.3, 0.25],
-        output=path,
-    )
+    swing(output=path)
     return path
 
 
