@@ -66,7 +66,7 @@ def contestants(members: int) -> dict[str, tuple[int, Callable[[int], Array]]]:
             times=[end],
             step=STEP,
             threads=1,
-            quantities=("position", *quantities),
+            record=("position", *quantities),
         )
         return np.asarray(batch.position.values[:, 0])
 
@@ -78,10 +78,9 @@ def contestants(members: int) -> dict[str, tuple[int, Callable[[int], Array]]]:
                 q0=q[k],
                 v0=v[k],
                 times=[end],
-                step=STEP,
-                integrator="runge_kutta_4",
+                numerics={"integrator": "runge_kutta_4", "step": STEP},
                 threads=1,
-                quantities=["position"],
+                record=["position"],
             )
             ends.append(run.position.values[0])
         return np.array(ends)

@@ -28,7 +28,7 @@ difference = np.abs(constraint.acceleration - recursion).max() / scale
 check("articulated_body against constraint_force, relative", difference, 0.0, 1e-6)
 
 run = lw.simulate(
-    model, times=[0.5, 1.0], q0=q0, tolerance=1e-8, quantities=["position", "energy", "statistics"]
+    model, times=[0.5, 1.0], q0=q0, tolerance=1e-8, record=["position", "energy", "statistics"]
 )
 
 end = run.position.isel(time=-1).values
@@ -43,7 +43,7 @@ if len(sys.argv) > 1:
     from picture import save
 
     kept = ["position", "joint_load"]
-    fall = lw.simulate(model, duration=12.0, every=0.05, q0=q0, tolerance=1e-6, quantities=kept)
+    fall = lw.simulate(model, duration=12.0, every=0.05, q0=q0, tolerance=1e-6, record=kept)
     force = lw.loads.quantities(fall).force / 1e3
     shown = ("joint_1", "joint_250", "joint_500", "joint_750")
     curves = {name: force.sel(joint=name) for name in shown}

@@ -42,9 +42,8 @@ for solver in lw.solvers():
         drives=drives,
         q0=START,
         tolerance=1e-6,
-        method="constraint_force",
-        solver=solver["name"],
-        quantities=["position", "statistics"],
+        numerics=lw.Numerics(method="constraint_force", solver=solver["name"]),
+        record=["position", "statistics"],
     )
     miss = np.abs(run.position.values[-1] - END).max()
     evaluations, iterations = int(run.evaluations[-1]), int(run.iterations[-1])

@@ -16,6 +16,7 @@ import hashlib
 import sys
 import warnings
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from functools import partial
 from importlib import metadata
 from pathlib import Path
@@ -315,10 +316,15 @@ def runs() -> Iterator[tuple[str, Callable[[], lw.Run]]]:
 
 
 def simulated(build: Callable[[], lw.Model], **options: Any) -> lw.Run:
-    rare = {key: options.pop(key) for key in ("initial_guess", "state") if key in options}
-    if hasattr(lw, "Numerics"):  # older builds take them as arguments
-        rare = {"numerics": lw.Numerics(**rare)}
-    return lw.simulate(build(), threads=1, on_failure="return", **options, **rare)
+    if hasattr(lw, "Recording"):  # older builds take them as arguments
+        kept = [field.name for field in fields(lw.Recording) if field.name in options]
+        named = [field.name for field in fields(lw.Numerics) if field.name in options]
+        options["record"] = {name: options.pop(name) for name in kept}
+        options["numerics"] = {name: options.pop(name) for name in named}
+    elif hasattr(lw, "Numerics"):
+        rare = [name for name in ("initial_guess", "state") if name in options]
+        options["numerics"] = {name: options.pop(name) for name in rare}
+    return lw.simulate(build(), threads=1, on_failure="return", **options)
 
 
 def scenario(path: Path) -> lw.Run:

@@ -30,6 +30,7 @@ from linkwise._core import momentum as momentum
 from linkwise._core import numerics as numerics
 from linkwise._core import passive_torque as passive_torque
 from linkwise._core import potential_energy as potential_energy
+from linkwise._core import quantities as quantities
 from linkwise._core import solver_options as solver_options
 from linkwise._core import solvers as solvers
 from linkwise._core import stop_rules as stop_rules
@@ -48,6 +49,7 @@ from linkwise.results import open_run as open_run
 from linkwise.scenario import load_scenario as load_scenario
 from linkwise.simulation.batch import simulate_batch as simulate_batch
 from linkwise.simulation.numerics import Numerics as Numerics
+from linkwise.simulation.recording import Recording as Recording
 from linkwise.simulation.scenarios import run_scenario as run_scenario
 from linkwise.simulation.simulate import SimulationError as SimulationError
 from linkwise.simulation.simulate import SimulationInterrupted as SimulationInterrupted

@@ -7,7 +7,7 @@ import linkwise as lw
 
 def simulate(model, duration, *, q0=None, v0=None, every=None, **options):
     """Times, positions and velocities of a run sampled at `every` (start and end by default)."""
-    options.setdefault("quantities", ["position", "velocity"])
+    options.setdefault("record", ["position", "velocity"])
     run = lw.simulate(
         model,
         duration=duration,

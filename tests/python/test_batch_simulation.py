@@ -31,8 +31,9 @@ def machine():
     return lw.scenes.srms()
 
 
-def alone(model, **options):
-    return lw.simulate(model, method="articulated_body", **options)
+def alone(model, *, step, integrator="runge_kutta_4", **options):
+    numerics = lw.Numerics(method="articulated_body", integrator=integrator, step=step)
+    return lw.simulate(model, numerics=numerics, **options)
 
 
 def assert_member(batch, run, tolerance):
@@ -79,7 +80,7 @@ def test_every_joint_type_from_its_neutral_configuration(rng):
     options = {"step": 1e-3, "times": [0.0, 0.05, 0.1234]}
     batch = lw.simulate_batch(model, q0=q0, **options)
     for k in range(6):
-        run = alone(model, q0=q0[k], integrator="runge_kutta_4", **options)
+        run = alone(model, q0=q0[k], **options)
         assert_member(batch.isel(member=k), run, 1e-8)
 
 
@@ -99,7 +100,6 @@ def test_axes_of_the_members(rng):
             models[at[0]],
             q0=q0[at[1], 0],
             drives=dict(zip(light.joint_names, tau[at[2]], strict=True)),
-            integrator="runge_kutta_4",
             **options,
         )
         member = batch.isel(dict(zip(("model", "member_1", "member_2"), at, strict=True)))
@@ -115,7 +115,7 @@ def test_a_member_that_fails_ends_alone():
     q0[4] = 0.1  # off the target of a spring that is too stiff for the step
     stiff = dict.fromkeys(model.joint_names, lw.Spring(1e8))
     batch = lw.simulate_batch(
-        model, q0=q0, drives=stiff, step=0.1, duration=50, every=0.1, quantities=["position"]
+        model, q0=q0, drives=stiff, step=0.1, duration=50, every=0.1, record=["position"]
     )
     assert batch.outcome.values.tolist() == [
         "not_finite" if k == 4 else "converged" for k in range(9)
@@ -130,9 +130,7 @@ def test_a_member_that_fails_ends_alone():
 
 
 def test_only_what_is_asked_for_is_recorded():
-    batch = lw.simulate_batch(
-        machine(), step=1e-2, duration=0.1, quantities=["joint_load", "energy"]
-    )
+    batch = lw.simulate_batch(machine(), step=1e-2, duration=0.1, record=["joint_load", "energy"])
     assert set(batch.data_vars) == {"joint_load", "kinetic_energy", "potential_energy"}
 
 
@@ -155,7 +153,7 @@ def test_only_what_is_asked_for_is_recorded():
             {"integrator": "euler"},
             "takes runge_kutta_4 or semi_implicit_euler, not 'euler'",
         ),
-        ({"quantities": ["statistics"]}, "quantities: a batch has no 'statistics'; use position"),
+        ({"record": ["statistics"]}, "record: a batch has no 'statistics'; use position"),
         (
             {"drives": {"elbow_pitch": lambda t, q, v: 0.0}},
             r"drives\['elbow_pitch'\] is a function",

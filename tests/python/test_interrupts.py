@@ -69,8 +69,7 @@ def test_very_many_tiny_steps_between_two_samples(integrator):
             times=times,
             progress=lambda reached: begun() if reached.time > 0 else None,
             q0=[0.1, 0.2, 0.3],
-            integrator=integrator,
-            **options,
+            numerics={"integrator": integrator, **options},
         ),
         lw.SimulationInterrupted,
     )
@@ -93,8 +92,7 @@ def test_inside_a_users_function():
         lw.simulate(
             lw.scenes.chain(3),
             times=[0.0, 1e-8, 1000.0],
-            integrator="runge_kutta_4",
-            step=1e-9,
+            numerics={"integrator": "runge_kutta_4", "step": 1e-9},
             drives={"joint_1": torque},
         )
     np.testing.assert_array_equal(caught.value.run.time, [0.0, 1e-8])
@@ -149,8 +147,7 @@ def test_a_handler_that_does_not_raise_does_not_stop():
                 lw.scenes.chain(3),
                 times=[0.0, 1e-8, 0.5],
                 progress=press.begun,
-                integrator="runge_kutta_4",
-                step=2e-6,
+                numerics={"integrator": "runge_kutta_4", "step": 2e-6},
             )
             assert press.pressed.wait(FUSE)
     finally:

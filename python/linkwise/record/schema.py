@@ -86,7 +86,7 @@ def resolve_quantities(quantities: Collection[str] | None) -> tuple[str, ...]:
         quantities = [quantities]
     for name in quantities:
         if name not in QUANTITIES:
-            raise InputError(f"quantities: unknown quantity {name!r}; use {', '.join(QUANTITIES)}")
+            raise InputError(f"record: unknown quantity {name!r}; use {', '.join(QUANTITIES)}")
     return tuple(name for name in QUANTITIES if name in quantities)
 
 

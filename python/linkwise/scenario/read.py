@@ -78,10 +78,12 @@ class Scenario(ScenarioSource):
             "q0": builder.state("position"),
             "v0": builder.state("velocity"),
             "every": output.every,
-            "quantities": builder.quantities(),
-            "joints": builder.joints(),
+            "record": {
+                "quantities": builder.quantities(),
+                "joints": builder.joints(),
+                "scenario_text": self.text,
+            },
             "output": None if output.path is None else self.resolve(output.path),
-            "scenario_text": self.text,
         }
 
     def _scene(self, kind: str, options: dict[str, Any]) -> Model:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +14,41 @@ from linkwise._core import InputError
 
 _DEFAULT_SAMPLES = 1000
 _MAX_SAMPLES = 100_000_000
+
+P = ParamSpec("P")
+R = TypeVar("R")
+T = TypeVar("T")
+
+
+def moved(**places: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Decorates a function that had these keywords: using one is a TypeError that says what to
+    write instead, with the keyword in the place of {}."""
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        @functools.wraps(function)
+        def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+            for name in kwargs:
+                if name in places:
+                    raise TypeError(f"{name}: give it as {places[name].format(name)}")
+            return function(*args, **kwargs)
+
+        return checked
+
+    return decorate
+
+
+def options_object(argument: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
+    """The dataclass `kind` from one itself, or from its fields by name; InputError where a name is
+    unknown."""
+    if given is None or isinstance(given, kind):
+        return given or kind()
+    known = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    if not isinstance(given, Mapping):
+        raise InputError(f"{argument}: {given!r} given; give a linkwise.{kind.__name__}")
+    for name in given:
+        if name not in known:
+            raise InputError(f"{argument}: unknown option {name!r}; known: {', '.join(known)}")
+    return kind(**given)
 
 
 def number(name: str, value: Any) -> float:
@@ -22,10 +60,6 @@ def number(name: str, value: Any) -> float:
     if not np.isfinite(number) or number <= 0:
         raise InputError(f"{name}: {number:g} given; give a finite number above 0")
     return number
-
-
-def optional_number(name: str, value: Any) -> float | None:
-    return None if value is None else number(name, value)
 
 
 def optional_count(name: str, value: Any) -> int | None:

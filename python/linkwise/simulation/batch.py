@@ -14,7 +14,7 @@ from linkwise.base import Array
 from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
-from linkwise.simulation.arguments import number, optional_count, sample_times
+from linkwise.simulation.arguments import moved, number, optional_count, sample_times
 from linkwise.simulation.simulate import SimulationInterrupted, check_driven, set_driven
 
 if TYPE_CHECKING:
@@ -102,6 +102,7 @@ def _dataset(
     )
 
 
+@moved(quantities="record=[...]")
 def simulate_batch(
     model: Model | Sequence[Model],
     *,
@@ -115,7 +116,7 @@ def simulate_batch(
     every: float | None = None,
     times: npt.ArrayLike | None = None,
     integrator: str = "runge_kutta_4",
-    quantities: Collection[str] | None = None,
+    record: Collection[str] | None = None,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Simulate many motions at once with fixed steps: members in SIMD lanes, lanes over threads.
@@ -134,8 +135,8 @@ def simulate_batch(
         drives, wrenches: As for `simulate`, the same for all members; functions are refused.
         every, times: When to record, as for `simulate`.
         integrator: One with a fixed step: "runge_kutta_4" or "semi_implicit_euler".
-        quantities: What to record, of "position", "velocity", "acceleration", "drive_torque",
-            "joint_load", "energy"; all by default.
+        record: Names of the quantities to record, of those that `linkwise.quantities()` marks
+            `of_members`; all of them by default.
         threads: Worker threads; the results do not depend on it.
 
     Returns:
@@ -151,10 +152,10 @@ def simulate_batch(
     models = _machines(model)
     first = models[0]
     sampled = sample_times(duration, every, times)
-    schema = build_schema(first, QUANTITIES if quantities is None else quantities)
+    schema = build_schema(first, QUANTITIES if record is None else record)
     unknown = [name for name in schema.quantities if name not in QUANTITIES]
     if unknown:
-        raise InputError(f"quantities: a batch has no {unknown[0]!r}; use {', '.join(QUANTITIES)}")
+        raise InputError(f"record: a batch has no {unknown[0]!r}; use {', '.join(QUANTITIES)}")
     given = {
         "q0": _rows("q0", first.initial_configuration() if q0 is None else q0, first.nq),
         "v0": _rows("v0", np.zeros(first.nv) if v0 is None else v0, first.nv),

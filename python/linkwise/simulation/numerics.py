@@ -36,29 +36,16 @@ class Numerics:
     state: str | None = None
     solver_options: Mapping[str, Any] | None = None
 
-    @classmethod
-    def of(cls, given: Numerics | Mapping[str, Any] | None) -> Numerics:
-        """From one itself, or from its fields by name; InputError where a name is unknown."""
-        if given is None or isinstance(given, Numerics):
-            return given or cls()
-        known = [field.name for field in fields(cls)]
-        if not isinstance(given, Mapping):
-            raise InputError(f"numerics: {given!r} given; give a linkwise.Numerics")
-        for name in given:
-            if name not in known:
-                raise InputError(f"numerics: unknown option {name!r}; known: {', '.join(known)}")
-        return cls(**given)
-
-    def with_given(self, **given: Any) -> dict[str, Any]:
-        """Keyword arguments of the core: these options, and before them those given here.
+    def options(self, tolerance: float | None = None) -> dict[str, Any]:
+        """What is given, as keyword arguments of the core; `tolerance` goes before the one here.
 
         InputError where a value is of the wrong kind.
         """
         options: dict[str, Any] = {}
         for field in fields(self):
-            name = field.name
-            value = given.get(name)
-            value = getattr(self, name) if value is None else value
+            name, value = field.name, getattr(self, field.name)
+            if name == "tolerance" and tolerance is not None:
+                value = tolerance
             if value is None:
                 continue
             if field.type == "float | None":

@@ -6,7 +6,7 @@ import contextlib
 import json
 import os
 import time as clock
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -22,13 +22,24 @@ from linkwise.record.provenance import describe, provenance
 from linkwise.record.schema import Schema, build_schema
 from linkwise.record.store import RunWriter
 from linkwise.results import Run
-from linkwise.simulation.arguments import optional_count, sample_times, state_vector
+from linkwise.simulation.arguments import (
+    moved,
+    optional_count,
+    options_object,
+    sample_times,
+    state_vector,
+)
 from linkwise.simulation.numerics import DEFAULTS, Numerics
+from linkwise.simulation.recording import Recording
 from linkwise.simulation.time_loop import Ending, Progress, run_time_loop
 
 if TYPE_CHECKING:
     from linkwise._core import Model, Simulation
     from linkwise.drives import Drive, Wrench
+
+
+_IN_NUMERICS = "numerics=lw.Numerics({}=...)"
+_IN_RECORD = "record=lw.Recording({}=...)"
 
 
 class _Stopped(BaseException):
@@ -174,6 +185,10 @@ def _require_memory(schema: Schema, samples: int) -> None:
     )
 
 
+@moved(
+    **dict.fromkeys(("integrator", "method", "solver", "step", "max_step"), _IN_NUMERICS),
+    **dict.fromkeys(("quantities", "joints", "scenario_text"), _IN_RECORD),
+)
 def simulate(
     model: Model,
     *,
@@ -185,19 +200,12 @@ def simulate(
     every: float | None = None,
     times: npt.ArrayLike | None = None,
     tolerance: float | None = None,
-    integrator: str | None = None,
-    method: str | None = None,
-    solver: str | None = None,
-    step: float | None = None,
-    max_step: float | None = None,
     numerics: Numerics | Mapping[str, Any] | None = None,
     threads: int | None = None,
-    quantities: Collection[str] | None = None,
-    joints: Sequence[str] | None = None,
+    record: Recording | Mapping[str, Any] | Collection[str] | None = None,
     output: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
     on_failure: Literal["raise", "return"] = "raise",
-    scenario_text: str = "",
 ) -> Run:
     """Simulate the motion of `model` from time 0 and return labelled results.
 
@@ -215,25 +223,18 @@ def simulate(
         times: The sample times instead [s], increasing.
         tolerance: Accuracy to aim at, relative to the size of the state and absolute; 1e-6 by
             default.
-        integrator: "adams" (the default), "bdf", or one that takes fixed steps of `step` seconds:
-            linkwise.integrators() lists them.
-        method: How accelerations are computed: "auto", or one of linkwise.methods().
-        solver: Linear solver of the constraint-force method: "auto", or one of linkwise.solvers().
-        step: Step of the fixed-step integrators [s].
-        max_step: Longest step of the others [s]; with given motions a fiftieth of the duration.
-        numerics: These and the rarer options in one object, or a dictionary of them; the
-            arguments above go before it.
+        numerics: Integrator, step, method, solver and the rarer options: a `Numerics`, or a
+            dictionary such as `{"integrator": "runge_kutta_4", "step": 1e-3}`.
+            `linkwise.numerics()` lists all with their defaults.
         threads: Worker threads; the results do not depend on it.
-        quantities: What to record, of "position", "velocity", "acceleration", "drive_torque",
-            "joint_load", "external_wrench", "energy", "statistics"; all by default.
-        joints: Names of the joints to record; all by default.
+        record: Names of the quantities to record, such as `["joint_load", "position"]`, or a
+            `Recording`, which also picks joints; everything by default.
         output: Path of a Zarr store to write while simulating; in memory when left out. An
             existing linkwise run there is replaced when this one has samples beyond its start;
             a person's files in its folder stay. Anything else there is refused.
         progress: Called with a `Progress` a few times a second.
         on_failure: "raise" SimulationError (SimulationInterrupted on Ctrl-C), or "return" the run
             that ended early; its `outcome` says why.
-        scenario_text: Kept in the provenance.
 
     Raises:
         InputError: an argument is wrong; nothing was written.
@@ -245,19 +246,13 @@ def simulate(
         state_vector("v0", v0, model.nv, np.zeros(model.nv)),
     )
     by_joint, by_body = check_driven(model, drives, wrenches)
-    schema = build_schema(model, quantities, joints, by_body)
+    recording = Recording.of(record)
+    schema = build_schema(model, recording.quantities, recording.joints, by_body)
     if on_failure not in ("raise", "return"):
         raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
     if output is not None:
         check_target(output)
-    options = Numerics.of(numerics).with_given(
-        tolerance=tolerance,
-        integrator=integrator,
-        method=method,
-        solver=solver,
-        step=step,
-        max_step=max_step,
-    )
+    options = options_object("numerics", Numerics, numerics).options(tolerance)
     if "max_step" not in options and any(isinstance(d, Motion) for d in by_joint.values()):
         # While all joints rest, steps would grow until they pass over a whole short motion.
         options["max_step"] = float(sampled[-1]) / 50 or None
@@ -275,14 +270,14 @@ def simulate(
             "duration": float(sampled[-1]),
             "quantities": schema.quantities,
         },
-        scenario=scenario_text,
+        scenario=recording.scenario_text,
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_body)
     if output is None:
         _require_memory(schema, sampled.size)
-    record = _recorder(model, schema, attrs, sampled.size, output)
-    run, ending = _record(model, simulation, record, schema, sampled, progress)
+    recorder = _recorder(model, schema, attrs, sampled.size, output)
+    run, ending = _record(model, simulation, recorder, schema, sampled, progress)
     if on_failure == "raise":
         raise_failure(model, ending, run)
     return run

@@ -54,10 +54,8 @@ def test_defaults(write):
         "q0": None,
         "v0": None,
         "every": None,
-        "quantities": None,
-        "joints": None,
+        "record": {"quantities": None, "joints": None, "scenario_text": path.read_text()},
         "output": None,
-        "scenario_text": path.read_text(),
     }
 
 
@@ -120,8 +118,8 @@ def test_everything(write, arm):
     assert wrench.frame == "body"
     np.testing.assert_array_equal(wrench.value.values[0], [1, 2, 3, 4, 5, 6])
     assert given["every"] == 0.01
-    assert given["quantities"] == ["joint_load", "energy"]
-    assert given["joints"] == ["slide"]
+    assert given["record"]["quantities"] == ["joint_load", "energy"]
+    assert given["record"]["joints"] == ["slide"]
     assert given["output"] == path.parent / "results" / "run.zarr"
 
 

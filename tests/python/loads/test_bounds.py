@@ -19,10 +19,14 @@ def test_bounds_hold(scene):
 def test_the_algebraic_bound_sees_an_early_stop(rng):
     """An iteration that stops far too early errs by as much as the bound says, and no less."""
     model = lw.scenes.chain(12, joint="spherical")
-    options = {"duration": 0.2, "every": 0.02, "method": "constraint_force"}
+    options = {"duration": 0.2, "every": 0.02}
     options |= {"q0": random_configuration(model, rng), "tolerance": 1e-3}
     loose = lw.simulate(
-        model, solver="conjugate_gradient", numerics=lw.Numerics(solver_tolerance=1e-4), **options
+        model,
+        numerics=lw.Numerics(
+            method="constraint_force", solver="conjugate_gradient", solver_tolerance=1e-4
+        ),
+        **options,
     )
     q, v = loose.position.values, loose.velocity.values
     exact = lw.joint_loads(model, q, v, np.zeros(model.nv))

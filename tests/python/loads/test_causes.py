@@ -166,8 +166,7 @@ def test_shares_add_up_whatever_solved(solver, rng):
         q0=random_configuration(model, rng),
         duration=0.3,
         every=0.1,
-        method="constraint_force",
-        solver=solver,
+        numerics=lw.Numerics(method="constraint_force", solver=solver),
         tolerance=1e-7,
     )
     total = lw.loads.split(run).sum("cause").transpose(*run.joint_load.dims).values
@@ -231,12 +230,12 @@ def test_given_accelerations_need_given_joints():
 )
 def test_a_run_that_lacks_something_says_what(quantities, missing):
     wrenches = {"hand": lw.Wrench([1, 0, 0, 0, 0, 0])}
-    run = lw.simulate(arm(), duration=0.1, every=0.05, quantities=quantities, wrenches=wrenches)
+    run = lw.simulate(arm(), duration=0.1, every=0.05, record=quantities, wrenches=wrenches)
     with pytest.raises(lw.InputError, match=f'record the quantity "{missing}"'):
         lw.loads.split(run)
 
 
 def test_a_split_needs_all_joints():
-    run = lw.simulate(arm(), duration=0.1, every=0.05, joints=["elbow"])
+    run = lw.simulate(arm(), duration=0.1, every=0.05, record=lw.Recording(joints=["elbow"]))
     with pytest.raises(lw.InputError, match="1 of 3 joints"):
         lw.loads.split(run)

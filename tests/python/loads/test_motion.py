@@ -61,10 +61,8 @@ def test_methods_and_integrators_agree(method, integrator):
         duration=0.5,
         every=0.1,
         drives={"elbow": lw.Motion(sine)},
-        method=method,
-        integrator=integrator,
+        numerics=lw.Numerics(method=method, integrator=integrator, **step),
         tolerance=1e-9,
-        **step,
     )
     reference = lw.simulate(
         arm(), duration=0.5, every=0.1, drives={"elbow": lw.Motion(sine)}, tolerance=1e-11

@@ -63,7 +63,7 @@ def test_figures_are_files(swing, tmp_path):
     ],
 )
 def test_a_run_that_lacks_the_quantity_says_so(draw, quantity):
-    run = lw.simulate(pendulum(), duration=0.1, every=0.05, quantities=["position"])
+    run = lw.simulate(pendulum(), duration=0.1, every=0.05, record=["position"])
     with pytest.raises(lw.InputError, match=f'record the quantity "{quantity}"'):
         draw(run)
 

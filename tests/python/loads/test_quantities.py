@@ -237,7 +237,7 @@ def test_payloads_and_changed_links():
 
 
 def test_a_run_says_what_it_lacks():
-    run = lw.simulate(pendulum(), duration=0.1, every=0.05, quantities=["position"])
+    run = lw.simulate(pendulum(), duration=0.1, every=0.05, record=["position"])
     with pytest.raises(lw.InputError, match='record the quantity "joint_load"'):
         lw.loads.summary(run)
     other = lw.simulate(pendulum(), duration=0.1, every=0.05)

@@ -53,7 +53,7 @@ def test_a_person_s_files_stay(path):
 
 def test_of_the_older_run_nothing_stays(path):
     before = {str(f.relative_to(path)) for f in path.rglob("*")}
-    lw.simulate(lw.scenes.chain(2), duration=0.1, output=path, quantities=["position"], every=0.05)
+    lw.simulate(lw.scenes.chain(2), duration=0.1, output=path, record=["position"], every=0.05)
     after = {str(f.relative_to(path)) for f in path.rglob("*")}
     assert after < before
     assert not (path / "joint_load").exists()

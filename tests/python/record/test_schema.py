@@ -132,7 +132,7 @@ def test_wrenches_are_recorded_of_wrenched_bodies_alone():
 @pytest.mark.parametrize(
     ("arguments", "pattern"),
     [
-        ({"quantities": ["positoin"]}, "quantities: unknown quantity 'positoin'; use position"),
+        ({"quantities": ["positoin"]}, "record: unknown quantity 'positoin'; use position"),
         ({"joints": ["elbw"]}, "elbw"),
     ],
 )

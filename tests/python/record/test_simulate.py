@@ -75,8 +75,7 @@ def test_subsets_are_the_same_numbers(chain):
         duration=1.0,
         every=0.1,
         q0=bend(chain),
-        quantities=["joint_load", "velocity"],
-        joints=["joint_3", "joint_1"],
+        record=lw.Recording(quantities=["joint_load", "velocity"], joints=["joint_3", "joint_1"]),
     )
     assert set(part.dataset.data_vars) == {"joint_load", "velocity"}
     kept = ["joint_1", "joint_3"]
@@ -112,9 +111,10 @@ def test_pace_follows_the_clock():
 
 @pytest.mark.parametrize("integrator", ["adams", "bdf", "runge_kutta_4", "semi_implicit_euler"])
 def test_results_do_not_depend_on_how_the_loop_is_cut(chain, monkeypatch, integrator):
-    options = {"duration": 1.0, "every": 0.013, "q0": bend(chain), "integrator": integrator}
+    numerics = {"integrator": integrator}
     if integrator not in ("adams", "bdf"):
-        options["step"] = 1e-3
+        numerics["step"] = 1e-3
+    options = {"duration": 1.0, "every": 0.013, "q0": bend(chain), "numerics": numerics}
     runs = []
     for count, pieces in ((1, 1), (7, 1), (1000, 1), (1, 5)):
         pace(monkeypatch, count, pieces)
@@ -144,8 +144,7 @@ def test_provenance(chain):
         duration=0.1,
         every=0.05,
         drives={"joint_1": lw.PD(10, 1, 0.2), "joint_2": lambda t, q, v: 0.0},
-        method="constraint_force",
-        solver="conjugate_gradient",
+        numerics=lw.Numerics(method="constraint_force", solver="conjugate_gradient"),
     )
     attrs = run.attrs
     assert attrs["outcome"] == run.outcome == "converged"
@@ -172,6 +171,19 @@ def test_progress_is_reported(chain):
 
 
 # -- wrong arguments -----------------------------------------------------------------------------
+
+
+def test_a_keyword_that_moved_says_where_to(chain):
+    for name, place in [
+        ("method", "numerics=lw.Numerics(method=...)"),
+        ("max_step", "numerics=lw.Numerics(max_step=...)"),
+        ("joints", "record=lw.Recording(joints=...)"),
+    ]:
+        with pytest.raises(TypeError) as caught:
+            lw.simulate(chain, duration=1.0, **{name: 1})
+        assert str(caught.value) == f"{name}: give it as {place}"
+    with pytest.raises(TypeError, match=r"quantities: give it as record=\[...\]"):
+        lw.simulate_batch(chain, duration=1.0, step=0.1, quantities=["position"])
 
 
 @pytest.mark.parametrize(
@@ -204,13 +216,14 @@ def test_progress_is_reported(chain):
         ({"drives": {"joint_1": [1.0, 2.0]}}, "joint_1"),
         ({"wrenches": {"link_9": [0] * 6}}, "wrenches: unknown body 'link_9'"),
         ({"wrenches": {"link_1": [0] * 5}}, r"wrenches\['link_1'\]: .*six"),
-        ({"integrator": "adam"}, "adam"),
-        ({"method": "magic"}, "magic"),
-        ({"solver": "magic", "method": "constraint_force"}, "magic"),
+        ({"numerics": {"integrator": "adam"}}, "adam"),
+        ({"numerics": {"method": "magic"}}, "magic"),
+        ({"numerics": {"solver": "magic", "method": "constraint_force"}}, "magic"),
         (
             {
-                "solver": "conjugate_gradient",
-                "numerics": lw.Numerics(initial_guess="magic", method="constraint_force"),
+                "numerics": lw.Numerics(
+                    solver="conjugate_gradient", initial_guess="magic", method="constraint_force"
+                ),
             },
             "magic",
         ),
@@ -229,11 +242,12 @@ def test_progress_is_reported(chain):
         ({"numerics": {"speed": 3}}, "numerics: unknown option 'speed'; known: tolerance"),
         ({"numerics": 3}, "numerics: 3 given"),
         ({"threads": 0}, "threads: 0 given"),
-        ({"step": -1}, "step: -1"),
-        ({"integrator": "runge_kutta_4"}, "step"),
-        ({"max_step": 0}, "max_step: 0"),
-        ({"quantities": ["loads"]}, "quantities: unknown quantity 'loads'"),
-        ({"joints": ["joint_9"]}, "joint_9"),
+        ({"numerics": {"step": -1}}, "step: -1"),
+        ({"numerics": {"integrator": "runge_kutta_4"}}, "step"),
+        ({"numerics": {"max_step": 0}}, "max_step: 0"),
+        ({"record": ["loads"]}, "record: unknown quantity 'loads'"),
+        ({"record": {"joints": ["joint_9"]}}, "joint_9"),
+        ({"record": {"every": 1}}, "record: unknown option 'every'; known: quantities"),
         ({"on_failure": "ignore"}, "on_failure: 'ignore'"),
     ],
 )

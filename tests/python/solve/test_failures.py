@@ -34,16 +34,15 @@ def run_until_it_stops(model, **options):
 
 
 def test_the_iteration_limit(chain):
-    message, run = run_until_it_stops(
-        chain, solver="jacobi", numerics=lw.Numerics(max_iterations=3)
-    )
+    numerics = lw.Numerics(solver="jacobi", max_iterations=3)
+    message, run = run_until_it_stops(chain, numerics=numerics)
     assert run.outcome == "reached_max_iterations"
     assert "use solver 'thomas' or 'two_level'" in message
 
 
 def test_stagnation_at_rounding_level(chain):
-    numerics = lw.Numerics(solver_tolerance=1e-18)
-    message, run = run_until_it_stops(chain, solver="conjugate_gradient", numerics=numerics)
+    numerics = lw.Numerics(solver="conjugate_gradient", solver_tolerance=1e-18)
+    message, run = run_until_it_stops(chain, numerics=numerics)
     assert run.outcome == "stagnated"
     assert "loosen the tolerance" in message
 
@@ -61,7 +60,7 @@ def run_until_it_stops_in(tree):
             tree,
             duration=0.5,
             drives={tree.joint_names[-1]: lambda t, q, v: [kick(t, q, v), 0.0]},
-            solver="jacobi",
+            numerics=lw.Numerics(solver="jacobi"),
         )
     assert caught.value.run.attrs["stop_joint"] in tree.joint_names
     return str(caught.value), caught.value.run

@@ -49,7 +49,9 @@ def test_wrong_options_are_refused_in_one_line(arm, options, parts):
     if isinstance(options, dict):
         with pytest.raises(lw.InputError):
             lw.simulate(
-                arm, duration=1.0, solver="sor", numerics=lw.Numerics(solver_options=options)
+                arm,
+                duration=1.0,
+                numerics=lw.Numerics(solver="sor", solver_options=options),
             )
 
 
@@ -169,7 +171,7 @@ def test_body_velocities_are_the_same_motion(name):
     q0 = model.neutral_configuration()
     options = {"duration": 1.0, "every": 0.25, "q0": q0, "v0": v0, "tolerance": 1e-10}
     joint, body = (
-        lw.simulate(model, **options, method="constraint_force", numerics=lw.Numerics(state=state))
+        lw.simulate(model, **options, numerics=lw.Numerics(method="constraint_force", state=state))
         for state in ("joint_rates", "body_velocities")
     )
     for quantity in ("position", "velocity", "joint_load"):
@@ -197,8 +199,7 @@ def test_body_velocities_need_constraint_forces(arm):
         lw.simulate(
             arm,
             duration=1.0,
-            method="articulated_body",
-            numerics=lw.Numerics(state="body_velocities"),
+            numerics=lw.Numerics(method="articulated_body", state="body_velocities"),
         )
     with pytest.raises(lw.InputError, match="joint_rates, body_velocities"):
         lw.simulate(arm, duration=1.0, numerics=lw.Numerics(state="momenta"))

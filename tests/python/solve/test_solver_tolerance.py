@@ -80,8 +80,7 @@ def test_long_chains_that_rounding_keeps_from_the_bound_go_on():
         every=0.05,
         q0=np.full(48, 0.05),
         tolerance=1e-11,
-        solver="two_level",
-        numerics=lw.Numerics(initial_guess="projection"),
+        numerics=lw.Numerics(solver="two_level", initial_guess="projection"),
     )
     direct = lw.simulate(model, duration=0.05, every=0.05, q0=np.full(48, 0.05), tolerance=1e-11)
     np.testing.assert_allclose(run.position[-1], direct.position[-1], atol=1e-8)

@@ -53,13 +53,15 @@ def test_nothing_there(linkwise):
     ],
 )
 def test_run_without_positions_or_loads(linkwise, tmp_path, quantities, parts):
-    lw.simulate(lw.scenes.chain(2), duration=0.1, quantities=quantities, output=tmp_path / "r.zarr")
+    lw.simulate(lw.scenes.chain(2), duration=0.1, record=quantities, output=tmp_path / "r.zarr")
     refuse(linkwise("view", "r.zarr", "--export", "a.html"), "r.zarr", *parts)
     assert not (tmp_path / "a.html").exists()
 
 
 def test_run_of_some_joints(linkwise, tmp_path):
-    lw.simulate(lw.scenes.chain(3), duration=0.1, joints=["joint_2"], output=tmp_path / "r.zarr")
+    lw.simulate(
+        lw.scenes.chain(3), duration=0.1, record={"joints": ["joint_2"]}, output=tmp_path / "r.zarr"
+    )
     refuse(linkwise("view", "r.zarr", "--export", "a.html"), "1 of 3", "record all joints")
 
 
@@ -92,7 +94,7 @@ def test_loads_that_cannot_be_shown(linkwise, run_path, tmp_path, arguments, par
 
 def test_causes_of_a_run_that_lacks_what_they_need(linkwise, tmp_path):
     kept = ["position", "joint_load"]
-    lw.simulate(lw.scenes.chain(2), duration=0.1, quantities=kept, output=tmp_path / "r.zarr")
+    lw.simulate(lw.scenes.chain(2), duration=0.1, record=kept, output=tmp_path / "r.zarr")
     result = linkwise("view", "r.zarr", "--export", "a.html", "--cause", "gravity")
     refuse(result, "'gravity'", 'record the quantity "velocity"')
 
