@@ -17,7 +17,7 @@ from pathlib import Path
 
 from linkwise._core import InputError
 from linkwise.record.checksums import GROUP, read_list
-from linkwise.record.claim import check_target, is_being_written, is_run
+from linkwise.record.claim import check_target, hold, is_run, release
 from linkwise.record.machine import GROUP as MACHINE
 from linkwise.record.schema import ORDER
 
@@ -44,7 +44,14 @@ def _leftovers(path: Path, what: str) -> list[Path]:
         found = sorted(f for f in path.parent.iterdir() if shape.fullmatch(f.name))
     except OSError:
         return []
-    return [f for f in found if f.is_dir() and not f.is_symlink() and not is_being_written(f)]
+    return [f for f in found if f.is_dir() and not f.is_symlink() and _is_abandoned(f)]
+
+
+def _is_abandoned(run: Path) -> bool:
+    """Whether no process writes a run; not so where there are no locks that could tell."""
+    lock = hold(run)
+    release(lock)
+    return lock is not None
 
 
 def restore(path: Path) -> None:

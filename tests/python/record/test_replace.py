@@ -172,6 +172,18 @@ def test_leftovers_of_the_living_stay(path):
     assert other.exists()
 
 
+def test_without_locks_nothing_is_cleared_away(path, monkeypatch):
+    """Nobody can tell then whether a process still writes there."""
+    from linkwise.record import claim
+
+    monkeypatch.setattr(claim, "fcntl", None)
+    other = path.with_name(".run.zarr.0123abcd.new")
+    other.mkdir()
+    simulate(path)
+    assert other.exists()
+    assert lw.open_run(path).sizes["time"] == 1001
+
+
 # -- a full disk ---------------------------------------------------------------------------------
 
 
