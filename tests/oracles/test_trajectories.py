@@ -155,8 +155,7 @@ def test_errors_of_the_babyboot_grow_as_its_disturbances_do(method):
 
     def angles(tolerance, twist=0.0):
         q0 = np.add(BABYBOOT_START, (0.0, twist))
-        numerics = lw.Numerics(tolerance=tolerance, method=method)
-        _, q, _ = simulate(model, 10.0, every=1.0, q0=q0, numerics=numerics)
+        _, q, _ = simulate(model, 10.0, every=1.0, q0=q0, tolerance=tolerance, method=method)
         return q[1:]
 
     small = 1e-9

@@ -9,7 +9,7 @@ import linkwise as lw
 def test_absurd_durations_end(options):
     with pytest.raises(lw.SimulationError, match=r"too_many_steps.*by max_steps") as info:
         lw.simulate(
-            lw.scenes.chain(2), duration=1e9, q0=[1, 1], numerics={"max_steps": 300}, **options
+            lw.scenes.chain(2), duration=1e9, q0=[1, 1], numerics={"max_steps": 300, **options}
         )
     run = info.value.run
     assert run.outcome == "too_many_steps"
