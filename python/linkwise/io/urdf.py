@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections import Counter
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -19,6 +18,7 @@ from lxml import etree
 from linkwise._core import InputError, Model, ModelBuilder
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.urdf_elements import UrdfElement
+from linkwise.io.urdf_vocabulary import ATTRIBUTES, Vocabulary
 from linkwise.io.xml import is_foreign, local_name
 
 Mimic = Literal["independent", "error"]
@@ -28,9 +28,7 @@ JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic", "planar", "floati
 _LIMITED = ("revolute", "prismatic")
 _LIMITS = ("lower", "upper", "effort", "velocity")
 _WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
-_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_LINK_CHILDREN = frozenset({"inertial", "visual", "collision"})
-_JOINT_CHILDREN = frozenset({"origin", "parent", "child", "axis", "limit", "dynamics", "mimic"})
+_INERTIA = ATTRIBUTES["inertia"]
 #: The part that a complaint of the core is about, by its first word.
 _PARTS = {
     "mass": "mass",
@@ -125,19 +123,14 @@ class _Reader:
         self.joints: list[UrdfElement] = []
         self._mimic = mimic
         self._mimics: dict[str, str] = {}
-        self._ignored: Counter[str] = Counter()
         self._found: dict[str, UrdfElement] = {}
         self._first: dict[str, UrdfElement] = {}  # of those whose name is used again
+        self._vocabulary = Vocabulary(path, root)
         for element in root.iterchildren(tag=etree.Element):
             tag = local_name(element)
-            if is_foreign(element, root):
-                self._refuse_xacro(element)
-                self._ignored[f"<{shorten(tag)}>"] += 1
-            elif tag in ("link", "joint"):
+            if tag in ("link", "joint") and not is_foreign(element, root):
                 found = self.links if tag == "link" else self.joints
                 found.append(self._named(element, tag))
-            elif tag != "material":
-                self._ignored[f"<{shorten(tag)}>"] += 1
         if not self.links:
             remedy = "give a complete URDF (if it comes from xacro, expand it first)"
             complain(path, "robot", "has no links", remedy, root.sourceline)
@@ -155,7 +148,6 @@ class _Reader:
 
     def add_link(self, builder: ModelBuilder, link: UrdfElement) -> None:
         name = str(link.get("name"))
-        link.count_unread(_LINK_CHILDREN, self._ignored)
         inertial = link.child("inertial")
         if inertial is None:
             builder.add_link(name)
@@ -183,7 +175,6 @@ class _Reader:
             if not link:
                 element.fail(f"has no {role} link", f'add <{role} link="..."/>')
             ends[role] = link
-        element.count_unread(_JOINT_CHILDREN, self._ignored)
         properties: dict[str, Any] = {}
         pose = element.origin()
         if pose is not None:
@@ -273,22 +264,10 @@ class _Reader:
                 f"mimics joint '{shorten(target)}'{missing}: "
                 "the coupling is ignored, it moves independently",
             )
-        for tag, count in sorted(self._ignored.items()):
-            text = f"{count} ignored: not part of the rigid-body dynamics"
-            self.notes.append(("info", tag, text))
+        self.notes += self._vocabulary.notes()
 
     def _note(self, element: str, text: str) -> None:
         self.notes.append(("warning", element, text))
-
-    def _refuse_xacro(self, element: etree._Element) -> None:
-        if "xacro" in str(element.tag).rpartition(local_name(element))[0]:
-            complain(
-                self.path,
-                f"element 'xacro:{shorten(local_name(element))}'",
-                "this is a xacro file, not yet a URDF",
-                "expand it first: xacro FILE.xacro > FILE.urdf",
-                element.sourceline,
-            )
 
     def with_line(self, error: InputError) -> InputError:
         """The core's complaint, ELEMENT of FILE: PROBLEM; REMEDY, as FILE:LINE: ELEMENT: ..."""

@@ -7,7 +7,6 @@ line, element and remedy.
 from __future__ import annotations
 
 import os
-from collections import Counter
 from typing import NoReturn
 
 import numpy as np
@@ -68,15 +67,16 @@ class UrdfElement:
             self.fail(f"<{local_name(self._element)}> has no <{tag}>", remedy)
         return found
 
-    def count_unread(self, read: frozenset[str], ignored: Counter[str]) -> None:
-        """Count the children that are none of those that are read."""
-        kind = local_name(self._element)
-        for child in self._element.iterchildren(tag=etree.Element):
-            if local_name(child) not in read:
-                ignored[f"<{shorten(local_name(child))}> of a {kind}"] += 1
-
     def get(self, attribute: str) -> str | None:
+        """An attribute, or what stands for it: a child of its name, the text of a <mass>."""
         text: str | None = self._element.get(attribute)
+        child = self.child(attribute) if attribute in self.children() else None
+        if child is not None:
+            if text is not None:
+                child.fail(f"gives {attribute} twice, as attribute and as element", "keep one")
+            text = child._element.get("value") or child._element.text or ""
+        if text is None and attribute == "value" and (self._element.text or "").strip():
+            text = self._element.text
         return text
 
     def number(self, attribute: str, what: str) -> float:

@@ -112,6 +112,12 @@ def local_name(element: etree._Element) -> str:
     return _split(element)[1].rpartition(":")[2]
 
 
+def is_xacro(element: etree._Element) -> bool:
+    """Whether an element is one of xacro's, by its namespace or its undeclared prefix."""
+    namespace, name = _split(element)
+    return "xacro" in namespace or name.startswith("xacro:")
+
+
 def is_foreign(element: etree._Element, root: etree._Element) -> bool:
     """Whether an element belongs to another vocabulary than the document's root."""
     namespace, name = _split(element)
