@@ -49,7 +49,7 @@ def console(*, stderr: bool = False) -> Console:
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError  # `main` decides; Rich would exit with 1
 
-    made = PipeAwareConsole(stderr=stderr, highlight=False, soft_wrap=False)
+    made = PipeAwareConsole(stderr=stderr, highlight=False, soft_wrap=False, markup=False)
     if not made.is_terminal:
         made.width = 200
     return made
@@ -70,9 +70,7 @@ def table(title: str, columns: Sequence[tuple[str, str]]) -> Table:
 
 def text(value: object) -> str:
     """Names come from files: neither Rich markup nor control characters in them take effect."""
-    from rich.markup import escape
-
-    return escape("".join(c if c.isprintable() else "?" for c in str(value)))
+    return "".join(c if c.isprintable() else "?" for c in str(value))
 
 
 def shown_path(path: object) -> str:

@@ -22,6 +22,8 @@ def paper(
     as_json: JsonOption = False,
 ) -> None:
     """Compute the tables and figures of the 1993 paper again and judge its claims."""
+    from rich.text import Text
+
     from linkwise.paper import write_report
 
     with live_steps(quiet=as_json) as progress:
@@ -34,7 +36,7 @@ def paper(
     colours = {"confirmed": "green", "confirmed in part": "yellow", "not confirmed": "red"}
     for claim in results["claims"]:
         verdict = claim["verdict"]
-        shown.add_row(text(claim["claim"]), f"[{colours[verdict]}]{verdict}[/]")
+        shown.add_row(text(claim["claim"]), Text(verdict, style=colours[verdict]))
     screen.print(shown)
     screen.print(
         f"Report: {output / 'index.html'}, data: {output / 'results.json'} "

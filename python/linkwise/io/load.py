@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 from linkwise._core import Model
 from linkwise.io.complaint import complain, shorten
+from linkwise.io.encoding import decode_xml
+from linkwise.io.files import MODEL_BYTES, read_bytes
 from linkwise.io.urdf import JointOrder, Mimic, read_urdf
 from linkwise.io.xml import local_name, parse_xml
 
@@ -36,7 +38,8 @@ def load(
 ) -> Model:
     """Read a URDF or MJCF file into a Model.
 
-    path: the file; its root element, not its suffix, tells the format.
+    path: the file, or the XML itself as a text that starts with ``<`` (what xacro returns); its
+        root element, not its suffix, tells the format.
     floating_base: give the root link of a URDF six degrees of freedom instead of welding it to the
         ground (an MJCF says this itself, with a free joint).
     gravity: m/s2 in the world frame; by default (0, 0, -9.81) for a URDF and the file's own for an
@@ -45,7 +48,8 @@ def load(
         checked, the dynamics needs no meshes.
     joint_order: "file" keeps the file's order (parents first), "pinocchio" goes depth first with
         the joints of one link by name, so that q, v and tau can be handed over as they are.
-    keep_fixed: keep links on fixed joints as bodies of their own instead of merging them.
+    keep_fixed: keep fixed joints that carry mass as joints with a load instead of merging
+        their links.
     mimic: a URDF's mimic joints are refused ("error"), for couplings are not supported, or they
         move "independent" of each other, with a warning note.
 
@@ -64,10 +68,13 @@ def load(
                 "give directories that hold the packages",
             )
     vector = None if gravity is None else _gravity(path, gravity)
+    xml: str | None = None
+    if isinstance(path, str) and path.lstrip("\ufeff \t\r\n").startswith("<"):
+        path, xml = "XML text", path
     suffix = Path(path).suffix.lower()
     if suffix in _HINTS:
         complain(path, "model file", "is not a model", f"it looks like {_HINTS[suffix]}")
-    root = parse_xml(path)
+    root = parse_xml(path, xml)
     kind = local_name(root)
     if kind == "robot":
         return read_urdf(
@@ -83,6 +90,11 @@ def load(
         from linkwise.io.mjcf import read_mjcf
         from linkwise.io.mjcf_limits import check_mjcf
 
+        if xml is None:
+            encoding = decode_xml(read_bytes(path, "model file", MODEL_BYTES), path)[1]
+            if encoding not in ("utf-8", "ascii"):
+                problem = f"is written in {encoding}, and MuJoCo reads UTF-8 alone"
+                complain(path, "model file", problem, "save it as UTF-8")
         check_mjcf(path, root)
         if floating_base:
             complain(
@@ -91,7 +103,7 @@ def load(
                 "an MJCF file says itself which bodies float",
                 "leave it out, and give the root body a <freejoint/>",
             )
-        return read_mjcf(path, gravity=vector, keep_fixed=keep_fixed)
+        return read_mjcf(path, gravity=vector, keep_fixed=keep_fixed, xml=xml)
     complain(
         path,
         f"element '{shorten(kind)}'",

@@ -30,14 +30,16 @@ def read_mjcf(
     *,
     gravity: tuple[float, float, float] | None = None,
     keep_fixed: bool = False,
+    xml: str | None = None,
 ) -> Model:
     """The model that an MJCF file describes.
 
-    gravity: m/s2; None takes the file's. Raises InputError with MuJoCo's own words for what its
-    compiler refuses, and when the optional package mujoco is missing. Contacts, tendons, equality
-    constraints, actuators and what else is not taken over are warnings in ``model.notes``.
+    gravity: m/s2; None takes the file's. xml: the text, where it is no file. Raises InputError with
+    MuJoCo's own words for what its compiler refuses, and when the optional package is missing.
+    Contacts, tendons, equality constraints, forces of actuators and what else is not taken over are
+    warnings in ``model.notes``.
     """
-    mj_model = compile_mjcf(path)
+    mj_model = compile_mjcf(path, xml)
     names = Names(mj_model)
     if gravity is None:
         gravity = tuple(mj_model.opt.gravity) if _enabled(mj_model, "GRAVITY") else (0, 0, 0)
@@ -55,8 +57,11 @@ def read_mjcf(
         raise InputError(f"{shorten(os.fspath(path), 400)}: {text}") from None
 
 
-def compile_mjcf(path: str | os.PathLike[str]) -> Any:
-    """The mujoco.MjModel of a file. Raises InputError as :func:`read_mjcf`."""
+def compile_mjcf(path: str | os.PathLike[str], xml: str | None = None) -> Any:
+    """The mujoco.MjModel of a file, or of a text that ``path`` only names.
+
+    Raises InputError as :func:`read_mjcf`.
+    """
     try:
         import mujoco
     except ImportError:
@@ -70,7 +75,10 @@ def compile_mjcf(path: str | os.PathLike[str]) -> Any:
     previous = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda message: None)
     try:
-        mj_model = mujoco.MjModel.from_xml_path(os.fspath(path))
+        if xml is None:
+            mj_model = mujoco.MjModel.from_xml_path(os.fspath(path))
+        else:
+            mj_model = mujoco.MjModel.from_xml_string(xml)
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         complain(
             path,

@@ -68,7 +68,8 @@ class _Check:
             self._complain(
                 element,
                 f"{_OTHER_MODELS[name]} is not read",
-                "paste the content in its place",
+                "let MuJoCo write one file: mujoco.mj_saveLastXML('flat.xml', "
+                "mujoco.MjModel.from_xml_path(FILE))",
             )
         below = sum(self._count(child) for child in element.iterchildren(etree.Element))
         copies = math.prod(self._numbers(element, key) for key in _COPIES.get(name, ()))

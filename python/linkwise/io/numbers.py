@@ -9,6 +9,8 @@ from linkwise.io.complaint import shorten
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\Z")
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)\Z", re.IGNORECASE)
+#: Characters of no width that editors and web pages leave in copied text.
+_INVISIBLE = dict.fromkeys((0x200B, 0x200C, 0x200D, 0x2060, 0xFEFF, 0xAD, 0x200E, 0x200F))
 
 
 def parse_number(text: str) -> float:
@@ -17,7 +19,7 @@ def parse_number(text: str) -> float:
     Raises ValueError with the problem in words. ``float`` alone would accept nan, infinity,
     underscores and digits of other scripts, and turn 1e400 into infinity.
     """
-    stripped = text.strip(" \t\r\n")
+    stripped = text.translate(_INVISIBLE).strip(" \t\r\n")
     if not stripped:
         raise ValueError("a number is missing")
     if not _NUMBER.match(stripped):

@@ -209,9 +209,12 @@ class _Reader:
                 self._note(name, f"has no <limit>, which a {kind} joint should have; unlimited")
             return {}
         given = [a for a in _LIMITS if limit.get(a) is not None]
-        found: dict[str, float] = {
-            a: limit.number(a, f"{a} limit") for a in ("effort", "velocity") if a in given
-        }
+        found: dict[str, float] = {}
+        for a in ("effort", "velocity"):
+            if a in given and (value := limit.limit(a)) is not None:
+                found[a] = value
+            elif a in given:
+                self._note(name, f"{a} limit '{shorten(limit.get(a))}' is read as unlimited")
         if kind not in _LIMITED:
             return found
         missing = [a for a in ("lower", "upper") if a not in given]
@@ -221,8 +224,13 @@ class _Reader:
             return found
         if missing:
             self._note(name, f"<limit> has no {missing[0]} bound; 0 is taken, as the format says")
-        bounds = {a: limit.number(a, f"{a} limit") if a in given else 0.0 for a in _LIMITS[:2]}
-        return bounds | found
+        for a, sign in (("lower", -1), ("upper", 1)):
+            value = limit.limit(a, sign) if a in given else 0.0
+            if value is not None:
+                found[a] = value
+            else:
+                self._note(name, f"{a} limit '{shorten(limit.get(a))}' is read as unlimited")
+        return found
 
     def _dynamics(self, element: UrdfElement, name: str, kind: str) -> dict[str, float]:
         dynamics = element.child("dynamics")

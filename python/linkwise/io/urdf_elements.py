@@ -13,7 +13,7 @@ import numpy as np
 from lxml import etree
 
 from linkwise.base import Array
-from linkwise.io.complaint import complain, shorten
+from linkwise.io.complaint import complain
 from linkwise.io.numbers import parse_number, parse_numbers
 from linkwise.io.xml import is_foreign, local_name
 
@@ -81,6 +81,16 @@ class UrdfElement:
 
     def number(self, attribute: str, what: str) -> float:
         return self.numbers(attribute, 1, what)[0]
+
+    def limit(self, attribute: str, sign: int = 0) -> float | None:
+        """A limit, None where it means unlimited: infinite (on the side of ``sign``), or, without a
+        sign, -1, as some simulators write it."""
+        text = (self.get(attribute) or "").strip().lower()
+        infinite = text.lstrip("+-") in ("inf", "infinity", "1.#inf")
+        if infinite and (text[0] == "-") == (sign < 0):
+            return None
+        value = self.number(attribute, f"{attribute} limit")
+        return None if sign == 0 and value == -1 else value
 
     def numbers(self, attribute: str, count: int, what: str) -> list[float]:
         """``count`` finite numbers of an attribute; complaints call them ``what``."""

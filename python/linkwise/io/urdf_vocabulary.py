@@ -8,6 +8,7 @@ is known to have no part in the dynamics is counted.
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
 from typing import NoReturn
 
@@ -73,10 +74,8 @@ _HARMLESS = {
 _WITH_THEIR_OWN = ("transmission", "sensor", "ros2_control", "plugin", "camera", "lidar")
 _MACROS = ("insert_block", "include", "macro")
 #: What Gazebo adds to links and joints by its own elements.
-_OF_GAZEBO = (
-    "joint springStiffness springReference dampingFactor turnGravityOff "
-    "gravity kinematic inertial mass stiffness damping"
-).split()
+_OF_GAZEBO = "joint springStiffness springReference dampingFactor inertial mass stiffness damping"
+_SWITCHES = ("turnGravityOff", "kinematic")
 
 
 class Vocabulary:
@@ -175,10 +174,10 @@ class Vocabulary:
             switched_on = (inner.text or "").strip().lower() not in ("false", "0", "")
             if tag == "gravity":
                 acts = not switched_on
-            elif tag in ("turnGravityOff", "kinematic"):
+            elif tag in _SWITCHES:
                 acts = switched_on
             else:
-                acts = tag in _OF_GAZEBO
+                acts = tag in _OF_GAZEBO.split()
             if acts:
                 self._warn(whom, inner, f"<{_shown(inner)}> of <gazebo> is not read")
 
@@ -248,13 +247,12 @@ class Vocabulary:
         harmless += _HARMLESS["limit"].split() if tag == "limit" else []
         for name, value in element.attrib.items():
             name = str(name)
-            if name in known and tag in ("joint", "link", "parent", "child", "mimic"):
-                if "${" in str(value) or "$(" in str(value):
-                    self._refuse(
-                        element,
-                        f"{name} holds the expression '{shorten(value)}'",
-                        "expand the xacro expression first",
-                    )
+            if name in ("name", "type", "link", "joint") and re.search(r"\$[{(]", str(value)):
+                self._refuse(
+                    element,
+                    f"{name} holds the expression '{shorten(value)}'",
+                    "expand the xacro expression first",
+                )
             if name in known or name.startswith("{") or ":" in name or name in harmless:
                 continue
             hint = near(name, known) if known else ""

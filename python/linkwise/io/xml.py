@@ -9,19 +9,29 @@ from xml.parsers import expat
 from lxml import etree
 
 from linkwise._core import InputError
-from linkwise.io.complaint import complain, shorten
+from linkwise.io.complaint import complain
+from linkwise.io.encoding import decode_xml
 from linkwise.io.files import MODEL_BYTES, read_bytes
+from linkwise.io.xml_slips import diagnose
 
 _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
 
-def parse_xml(path: str | os.PathLike[str]) -> etree._Element:
-    """The root element of a model file.
+def parse_xml(path: str | os.PathLike[str], text: str | None = None) -> etree._Element:
+    """The root element of a model file, or of ``text``, which ``path`` then only names.
 
     Raises InputError for a file that is missing, too large, not XML, or that holds a DOCTYPE
     (hence any entity definition: entity bombs and external entities alike) or an XInclude.
     """
-    data = read_bytes(path, "model file", MODEL_BYTES)
+    if text is None:
+        data = read_bytes(path, "model file", MODEL_BYTES)
+    else:
+        data = text.encode("utf-8", "replace")
+        if len(data) > MODEL_BYTES:
+            problem = f"is larger than {MODEL_BYTES // 2**20} MiB"
+            complain(path, "model", problem, "build it with linkwise.ModelBuilder")
+    decoded, _ = decode_xml(data, path)
+    data = decoded.encode("utf-8", "replace")
     _refuse_doctype(data, path)
     root = _parse(data, path)
     # The two parsers might disagree on where the prolog ends; lxml decides.
@@ -44,9 +54,11 @@ class _PrologEnd(Exception):  # noqa: N818, it is no error
 
 def _refuse_doctype(data: bytes, path: str | os.PathLike[str]) -> None:
     """Stop at a DOCTYPE before anything that it declares is read."""
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate("utf-8")
 
-    def doctype(*_: object) -> None:
+    def doctype(name: str, *_: object) -> None:
+        if name.lower() == "html":
+            _complain_syntax(path, data, "a web page", None)
         _complain_doctype(path, parser.CurrentLineNumber)
 
     def element(*_: object) -> None:
@@ -61,7 +73,7 @@ def _refuse_doctype(data: bytes, path: str | os.PathLike[str]) -> None:
     except InputError:  # itself a ValueError
         raise
     except (expat.ExpatError, ValueError, LookupError) as error:
-        _complain_syntax(path, str(error), getattr(error, "lineno", None))
+        _complain_syntax(path, data, str(error), getattr(error, "lineno", None))
 
 
 def _complain_doctype(path: str | os.PathLike[str], line: int | None) -> None:
@@ -74,10 +86,12 @@ def _complain_doctype(path: str | os.PathLike[str], line: int | None) -> None:
     )
 
 
-def _complain_syntax(path: str | os.PathLike[str], message: str, line: int | None) -> None:
-    text = re.sub(r"(, line \d+, column \d+|: line \d+, column \d+).*$", "", message)
-    problem = f"is not XML ({shorten(text, 120)})"
-    complain(path, "model file", problem, "give a URDF or MJCF file", line)
+def _complain_syntax(
+    path: str | os.PathLike[str], data: bytes, message: str, line: int | None
+) -> None:
+    said = re.sub(r"(, line \d+, column \d+|: line \d+, column \d+).*$", "", message)
+    problem, remedy, where = diagnose(data.decode("utf-8", "replace"), said, line)
+    complain(path, "model file", problem, remedy, where)
 
 
 def _parser(recover: bool) -> etree.XMLParser:
@@ -88,6 +102,7 @@ def _parser(recover: bool) -> etree.XMLParser:
         huge_tree=False,
         remove_comments=True,
         remove_pis=True,
+        encoding="utf-8",
         recover=recover,
     )
 
@@ -100,10 +115,10 @@ def _parse(data: bytes, path: str | os.PathLike[str]) -> etree._Element:
         # Robot files often use a prefix such as <controller:ros_control> without declaring it;
         # other URDF readers know no namespaces and accept that. The elements are ignored here too.
         if any(entry.domain_name != "NAMESPACE" for entry in parser.error_log):
-            _complain_syntax(path, error.msg or "", error.lineno)
+            _complain_syntax(path, data, error.msg or "", error.lineno)
     root = etree.fromstring(data, _parser(recover=True))
     if root is None:
-        _complain_syntax(path, "document is empty", None)
+        _complain_syntax(path, data, "document is empty", None)
     return root
 
 

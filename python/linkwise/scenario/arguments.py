@@ -329,6 +329,12 @@ class ArgumentBuilder:
 
     def _check_joint(self, joint: str, keys: Sequence[str]) -> int:
         if joint not in self.joint_names:
+            try:
+                self.model.joint_index(joint)
+            except InputError as error:
+                if "merged" in str(error):  # a fixed joint of the file
+                    problem, _, remedy = str(error).partition("; ")
+                    self.source.complain(keys, problem, remedy)
             remedy = near(joint, self.joint_names, "the joints are")
             self.source.complain(keys, f"the model has no joint '{shorten(joint)}'", remedy)
         return self.joint_names[joint]

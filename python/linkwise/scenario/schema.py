@@ -210,9 +210,11 @@ class WrenchSection(_Tabled):
         return self
 
 
-Mass = Annotated[Number, Field(ge=0)]
+Mass = Annotated[float, _of("number", "mass"), Field(ge=0)]
 Point = Annotated[list[Annotated[float, _of("length")]], Field(min_length=3, max_length=3)]
-Inertia = Annotated[list[Number], Field(min_length=3, max_length=6)]
+Inertia = Annotated[
+    list[Annotated[float, _of("number", "inertia")]], Field(min_length=3, max_length=6)
+]
 
 
 class LinkSection(Section):

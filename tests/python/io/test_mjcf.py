@@ -243,7 +243,7 @@ LARGE = [
     ('<include file="other.xml"/>', ":2: element 'include': a file that is included is not read; "),
     (
         '<asset><model name="m" file="other.xml"/></asset>',
-        ":2: element 'model': a model in a file of its own is not read; paste the content",
+        ":2: element 'model': a model in a file of its own is not read; let MuJoCo",
     ),
     (
         '<worldbody><replicate count="1000"><replicate count="1000"><body><geom size="1"/></body>'
