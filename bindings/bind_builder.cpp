@@ -142,7 +142,7 @@ void bind_builder(nb::module_& m) {
           nb::kw_only(), "keep_fixed"_a = false,
           "Checks everything and builds the Model; InputError names the element and the remedy. "
           "keep_fixed keeps\n"
-          "fixed joints whose child has mass as joints with a load instead of merging the child "
+          "fixed joints that carry mass as joints with a load instead of merging the child "
           "into its parent.");
 
   m.def("make_chain", &chain_of, "n_bodies"_a, nb::kw_only(), "joint"_a, "axes"_a, "translation"_a,

@@ -107,13 +107,23 @@ DynamicsOptions evaluation_options() {
   return options;
 }
 
+std::string remedy_at(const Model& model, Outcome outcome, int body) {
+  if (outcome == Outcome::not_positive_definite && body >= 0)
+    if (std::string axes = model.lined_up(body); !axes.empty()) return axes;
+  return std::string(remedy(outcome));
+}
+
+void require_determined(const Model& model) {
+  if (!model.undetermined().empty()) throw InputError(model.undetermined());
+}
+
 std::string failure_text(const Model& model, const EvaluationReport& report) {
   const Choice& by = report.choice;
   return "method " + by.method + (by.solver.empty() ? "" : " with solver " + by.solver) + ": " +
          std::string(message(report.outcome)) +
          (report.body < 0 ? ""
                           : " at body '" + model.body_name(report.body) + "'" + model.where()) +
-         "; " + std::string(remedy(report.outcome));
+         "; " + remedy_at(model, report.outcome, report.body);
 }
 
 std::vector<Cause> causes_from_names(std::span<const std::string> names) {
@@ -235,6 +245,7 @@ EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& sta
   const Model& m = *model_;
   check(m, count, states);
   check_prescribed(m, states);
+  require_determined(m);
   EvaluationReport report;
   Lease workspace(*this);
   const Pick picked =
@@ -272,6 +283,7 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
   const Model& m = *model_;
   check(m, count, states);
   check_prescribed(m, states);
+  require_determined(m);
   if (method != "articulated_body" && method != "constraint_force")
     throw InputError("method '" + method +
                      "' does not split loads; use articulated_body or constraint_force");

@@ -32,6 +32,13 @@ struct EvaluationReport {
   bool ok() const { return outcome == Outcome::converged; }
 };
 
+/// Throws InputError where the machine does not determine its accelerations; see find_undetermined.
+void require_determined(const Model& model);
+
+/// What to do about a failure at a body (-1: at none): the outcome's remedy, or that of axes which
+/// line up without mass between them.
+std::string remedy_at(const Model& model, Outcome outcome, int body);
+
 /// One line: the method, what happened, where, and the remedy.
 std::string failure_text(const Model& model, const EvaluationReport& report);
 

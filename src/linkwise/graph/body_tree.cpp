@@ -25,6 +25,9 @@ Lumps make_lumps(const MachineGraph& graph, const SpanningForest& forest) {
   }
   for (int j : forest.cuts)
     for (int link : {graph.joints[j].parent, graph.joints[j].child}) ++out.outboard[out.lead[link]];
+  out.light = out.massless;
+  for (auto j = out.moving.rbegin(); j != out.moving.rend(); ++j)
+    if (!out.light[graph.joints[*j].child]) out.light[out.lead[graph.joints[*j].parent]] = 0;
   return out;
 }
 

@@ -16,6 +16,7 @@ struct Lumps {
   std::vector<int> welds;      ///< joints inside lumps, in the forest's order
   std::vector<int> moving;     ///< the forest's other joints, in its order
   std::vector<char> massless;  ///< by lead
+  std::vector<char> light;     ///< by lead: massless, and so is all that hangs on it
   std::vector<int> outboard;   ///< by lead: moving joints and ends of cut joints on it
 };
 
@@ -48,7 +49,7 @@ BodyTree stack_massless(const MachineGraph& graph, const SpanningForest& forest,
 /// Is a lump not a body of its own, because its inboard joint is part of the next body's
 /// connection?
 inline bool is_stacked(const Lumps& lumps, int lead) {
-  return lumps.massless[lead] && lumps.outboard[lead] == 1;
+  return lumps.massless[lead] && lumps.outboard[lead] == 1 && !lumps.light[lead];
 }
 
 }  // namespace linkwise

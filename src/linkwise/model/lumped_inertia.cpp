@@ -42,15 +42,12 @@ void check_inertia(const Machine& machine, int l, bool welded, const Inertia<dou
                    " kg m2); give a positive semidefinite inertia about the centre of mass");
 }
 
-/// A lump without mass may carry one joint, or several in the recursion.
+/// A lump without mass may carry one joint, or several in the recursion. What hangs on a light one
+/// is find_undetermined's business.
 void check_massless(const Machine& machine, const Lumps& lumps, std::vector<Note>& notes) {
   for (int j : lumps.moving) {
     const int l = machine.graph.joints[j].child;
-    if (!lumps.massless[l] || lumps.outboard[l] == 1) continue;
-    if (lumps.outboard[l] == 0)
-      throw InputError("link '" + machine.link_name(l) + "'" + machine.where +
-                       " has no mass and is a leaf, but joint '" + machine.joint(j).name +
-                       "' can move it; give it a mass and an inertia, or make the joint fixed");
+    if (!lumps.massless[l] || lumps.light[l] || lumps.outboard[l] == 1) continue;
     notes.push_back({NoteLevel::warning, machine.link_name(l),
                      "has no mass and carries several joints; method constraint_force cannot "
                      "take it, articulated_body can"});

@@ -52,6 +52,26 @@ bool acts(const JointSpec& joint) {
   return std::any_of(joint.dof.begin(), joint.dof.end(), counts);
 }
 
+/// By link: has it mass, or has anything that hangs on it?
+std::vector<char> links_that_carry(const MachineGraph& graph) {
+  std::vector<std::vector<int>> parents(graph.n_links());
+  for (const auto& joint : graph.joints) parents[joint.child].push_back(joint.parent);
+  std::vector<char> carries(graph.n_links(), 0);
+  std::vector<int> waiting;
+  const auto mark = [&](int link) {
+    if (!carries[link]) waiting.push_back(link);
+    carries[link] = 1;
+  };
+  for (int l = 0; l < graph.n_links(); ++l)
+    if (!graph.massless[l]) mark(l);
+  while (!waiting.empty()) {
+    const int link = waiting.back();
+    waiting.pop_back();
+    for (int parent : parents[link]) mark(parent);
+  }
+  return carries;
+}
+
 /// The link that no joint has as child; the first of them, or the first of all.
 int root_link(const MachineGraph& graph) {
   std::vector<char> is_child(graph.n_links(), 0);
@@ -115,9 +135,11 @@ Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::s
   for (const JointSpec& j : spec.joints) {
     const int parent = find_link(spec, links, j.parent, j, "parent", where);
     const int child = find_link(spec, links, j.child, j, "child", where);
-    const bool weld =
-        j.type == JointType::fixed && !(spec.keep_fixed && spec.links[child].mass > 0);
-    graph.joints.push_back({parent, child, joint_dof(j), acts(j), weld});
+    graph.joints.push_back({parent, child, joint_dof(j), acts(j), j.type == JointType::fixed});
+  }
+  if (spec.keep_fixed) {
+    const std::vector<char> carries = links_that_carry(graph);
+    for (auto& joint : graph.joints) joint.weld = joint.weld && !carries[joint.child];
   }
   machine.prescribed.assign(spec.joints.size() + 1, 0);
   for (const std::string& name : spec.prescribed) {

@@ -4,6 +4,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/model/hinge_frames.hpp"
+#include "linkwise/model/undetermined.hpp"
 #include "linkwise/model/validate.hpp"
 
 namespace linkwise {
@@ -38,6 +39,7 @@ Model::Model(ModelSpec given) : spec_(std::move(given)) {
   const BodyTree tree = stack_massless(machine.graph, forest, lumps);
   PlacedJoints placed = place_joints(machine, lumps, lumped, tree);
   Bodies bodies = make_bodies(machine, lumped, tree, placed, notes);
+  undetermined_ = find_undetermined(machine, lumps, lumped, notes);
   choose_hinge_frames(bodies, placed);
   links = place_links(machine, lumps, lumped, placed);
 
@@ -67,6 +69,14 @@ int Model::joint_index(const std::string& name) const {
   const int found = joint_by_name_.find(
       name, [this](int i) -> const auto& { return joints[i].name; });
   if (found >= 0) return found;
+  for (const JointSpec& j : spec_.joints)
+    if (j.name == name && j.type == JointType::fixed)
+      throw InputError(
+          "joint '" + name + "'" + where() + " is fixed and its links are merged" +
+          (spec_.keep_fixed
+               ? ": nothing on it has mass, so it carries no load; give a link on it mass"
+               : "; load with keep_fixed (keep_fixed = true in a scenario) to have "
+                 "its load"));
   std::vector<std::string> known;
   for (const auto& j : joints) known.push_back(j.name);
   throw InputError("joint '" + name + "' does not exist in model '" + spec_.name + "'" + where() +
@@ -103,6 +113,21 @@ std::string Model::body_name(int body) const {
   for (const JointInfo& j : joints)
     if (j.body == body && j.last_of_body) return links[j.link].name;
   return "?";
+}
+
+std::string Model::lined_up(int body) const {
+  if (topology[body].nv < 2) return "";
+  std::string in_line, massless;
+  int count = 0;
+  for (const JointInfo& j : joints) {
+    if (j.body != body) continue;
+    in_line += (count++ ? ", '" : "'") + j.name + "'";
+    if (!j.last_of_body) massless += (massless.empty() ? "'" : ", '") + links[j.link].name + "'";
+  }
+  if (count < 2) return "";
+  return "joints " + in_line + " line up here (gimbal lock) and links " + massless +
+         " between them have no mass: give those links mass and inertia, keep away from this "
+         "position, or make one spherical joint of the joints";
 }
 
 const JointSpec& Model::joint_spec(int joint) const {

@@ -100,7 +100,12 @@ class Model {
   bool has_passive_forces() const { return has_passive_; }
   /// First body whose 6x6 inertia is singular (index), or -1; the constraint-force form needs none.
   int singular_body() const { return singular_body_; }
+  /// What keeps accelerations from being determined, one line with its remedy, or "".
+  const std::string& undetermined() const { return undetermined_; }
   std::string body_name(int body) const;
+  /// Where a body hangs on several axes without mass between them: that they may line up, and the
+  /// remedy. Otherwise "".
+  std::string lined_up(int body) const;
   /// What the user said about a joint, axes normalised.
   const JointSpec& joint_spec(int joint) const;
   /// Index of the joint inboard of each joint, -1 at the ground.
@@ -128,6 +133,7 @@ class Model {
   double total_mass_ = 0;
   bool has_passive_ = false;
   int singular_body_ = -1;
+  std::string undetermined_;
   NameIndex joint_by_name_, link_by_name_;
 };
 

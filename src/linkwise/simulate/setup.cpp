@@ -2,6 +2,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/body_velocities.hpp"
+#include "linkwise/dynamics/evaluator.hpp"
 #include "linkwise/simulate/given_motion.hpp"
 
 namespace linkwise {
@@ -56,6 +57,7 @@ void Setup::settle() {
     throw InputError(
         "state body_velocities takes no motion drives; use the state joint_rates for them");
   driven_ = driven_model(*model, drives);
+  require_determined(driven());
   settled_ = true;
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/dynamics/evaluator.hpp"
 #include "linkwise/simulate/body_velocity_state.hpp"
 #include "linkwise/simulate/given_motion.hpp"
 #include "linkwise/solve/registry.hpp"
@@ -192,7 +193,7 @@ Ending Simulation::failure(size_t member, double t, Outcome outcome, int body,
     for (int i = info.v; i < info.v + info.nv && body < 0; ++i)
       if (!(std::abs(du[i]) < largest_acceleration)) joint = j;
   }
-  return {outcome, t, joint, describe(outcome)};
+  return {outcome, t, joint, std::string(message(outcome)) + "; " + remedy_at(m, outcome, body)};
 }
 
 // ---- What the integrator sees -------------------------------------------------------------------

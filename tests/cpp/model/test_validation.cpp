@@ -76,20 +76,6 @@ const Wrong wrong_links[] = {
      "model 'arm' of arm.urdf has no links; add at least one"},
     {"gravity_not_a_number", [](ModelSpec& s) { s.gravity.y = nan; },
      "model 'arm' of arm.urdf: gravity is not finite; give three finite numbers in m/s2"},
-    {"massless_leaf",
-     [](ModelSpec& s) {
-       s.links[2] = {"lower", 0, {}, {}};
-     },
-     "link 'lower' of arm.urdf has no mass and is a leaf, but joint 'elbow' can move it; give it a "
-     "mass and an inertia, or make the joint fixed"},
-    {"massless_floating_root",
-     [](ModelSpec& s) {
-       s.floating_base = true;
-       s.links = {{"base", 0, {}, {}}};
-       s.joints.clear();
-     },
-     "link 'base' of arm.urdf has no mass and is a leaf, but joint 'root_joint' can move it; give "
-     "it a mass and an inertia, or make the joint fixed"},
     {"stack_too_free",
      [](ModelSpec& s) {
        s.links[1] = {"upper", 0, {}, {}};
