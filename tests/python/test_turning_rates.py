@@ -92,3 +92,80 @@ def test_what_has_come_far_is_held_as_well(joint, offset, integrator):
         np.abs(swing(joint, start, integrator, 1e-6) - exact).max() for start in (0.0, offset)
     )
     assert far < 3 * near
+
+
+# ---- Armature, damping and friction of joints whose rates turn ------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("joint", "options", "spin"),
+    [("floating", {}, [0.5, -1.0, 3.0]), ("planar", {"axis": [0, 0, 1]}, [3.0])],
+)
+def test_an_armature_does_not_bend_a_straight_flight(joint, options, spin):
+    model = body(joint, armature=0.5, **options)
+    start = [1.0] + [0.0] * (model.nv - len(spin) - 1)
+    run = lw.simulate(model, duration=2, every=0.5, v0=[*start, *spin], quantities=None)
+    line = run.time.values[:, None] * np.array(start)
+    np.testing.assert_allclose(run.position[:, : len(start)], line, atol=1e-10)
+    energy = run.kinetic_energy.values
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-5)
+
+
+def test_rotors_on_a_ball_joint_keep_their_energy():
+    """Of unequal armatures the momentum turns with the child: without w x (D w) energy drifts."""
+    model = body("spherical", armature=[0.1, 0.6, 0.3])
+    run = lw.simulate(model, duration=20, every=1, v0=[1.0, 2.0, -0.5])
+    # The armatures act as a body's own inertia, whose energy and momentum Euler's equations keep.
+    solid = np.diag(INERTIA) + [0.1, 0.6, 0.3]
+    momentum = np.linalg.norm(run.velocity.values * solid, axis=1)
+    np.testing.assert_allclose(momentum, momentum[0], rtol=1e-5)
+    np.testing.assert_allclose(run.kinetic_energy, run.kinetic_energy[0], rtol=1e-5)
+
+
+@pytest.mark.parametrize("count", [1, 11])
+def test_every_method_and_inverse_dynamics_agree_on_turning_armatures(count, rng):
+    builder = lw.ModelBuilder("turning")
+    for k in range(3):
+        builder.add_link(f"link{k}", mass=1.0 + k, com=(0.1, 0.2, -0.1), inertia=np.eye(3) * 0.1)
+    builder.set_floating_base()
+    builder.add_joint("ball", "spherical", "link0", "link1", armature=[0.1, 0.2, 0.4])
+    builder.add_joint("table", "planar", "link1", "link2", axis=[1, 1, 0], armature=0.3)
+    model = builder.build()
+    q = np.tile(model.neutral_configuration(), (count, 1))
+    v, tau = rng.standard_normal((2, count, model.nv))
+    expected = lw.forward_dynamics(model, q, v, tau)
+    assert np.abs(expected - lw.forward_dynamics(model, q, 0 * v, tau)).max() > 1
+    np.testing.assert_allclose(lw.inverse_dynamics(model, q, v, expected), tau, atol=1e-12)
+    for method in lw.methods():
+        if method["name"] in ("auto", "piecewise"):
+            continue
+        found = lw.forward_dynamics(model, q, v, tau, method=method["name"], tolerance=1e-14)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    causes = ["gravity", "velocity", "drive"]
+    for method in ("articulated_body", "constraint_force"):
+        shares = lw.joint_loads_by_cause(model, causes, q, v, tau, method=method)
+        np.testing.assert_allclose(
+            shares.sum(axis=-3), lw.joint_loads(model, q, v, tau), atol=1e-11
+        )
+
+
+def test_unequal_armatures_along_turning_axes_are_refused():
+    with pytest.raises(lw.InputError, match="armature differs between its linear"):
+        body("floating", armature=[1, 2, 1, 0, 0, 0])
+
+
+@pytest.mark.parametrize("joint", ["floating", "planar"])
+def test_dry_friction_brakes_along_the_line_of_flight(joint):
+    """Friction along the parent's axes stops a body that flies along one of them: its spin turns
+    no part of the force to the side, and 4 m/s take v / (f / m) = 4 s."""
+    friction = {"floating": [2.0] * 3 + [0.0] * 3, "planar": [2.0, 2.0, 0.0]}[joint]
+    model = body(joint, friction=friction, friction_velocity=1e-4)
+    spin = {"floating": [0, 0, 5.0], "planar": [5.0]}[joint]
+    linear = model.nv - len(spin)
+    run = lw.simulate(
+        model, duration=3.0, every=1.0, v0=[4.0] + [0.0] * (linear - 1) + spin,
+        numerics=numerics("bdf"),
+    )  # fmt: skip
+    travelled = 4 * run.time.values - 0.5 * run.time.values**2
+    np.testing.assert_allclose(run.position[:, 0], travelled, atol=1e-4)
+    np.testing.assert_allclose(run.position[:, 1], 0, atol=1e-4)

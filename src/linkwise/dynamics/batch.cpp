@@ -6,11 +6,23 @@
 #include "linkwise/dynamics/articulated_body.hpp"
 #include "linkwise/dynamics/constraint_elimination.hpp"
 #include "linkwise/dynamics/inverse_dynamics.hpp"
+#include "linkwise/forces/armature_bias.hpp"
 
 namespace linkwise {
 
 struct BatchEvaluator::Work {
-  explicit Work(const Model& model) : model_(&model) {}
+  explicit Work(const Model& model) : model_(&model), armature_bias_(has_armature_bias(model)) {}
+
+  /// tau with factor times the bias of the armatures, one row per system.
+  std::vector<double> biased(size_t count, const BatchInput& in, const double* tau,
+                             double factor) const {
+    std::vector<double> rows(count * nv());
+    if (tau) std::copy_n(tau, rows.size(), rows.begin());
+    for (size_t i = 0; i < count && in.v; ++i)
+      add_armature_bias(*model_, in.v + i * nv(), factor, rows.data() + i * nv());
+    return rows;
+  }
+  bool armature_bias() const { return armature_bias_; }
 
   template <class Scalar, class OnLanes>
   int forward_dynamics(std::unique_ptr<Scalar>& scalar, std::unique_ptr<OnLanes>& on_lanes,
@@ -39,26 +51,31 @@ struct BatchEvaluator::Work {
                      double* loads) {
     int failed = -1;
     const size_t stride = causes.size() * n_load();
+    std::vector<double> bias;
+    if (armature_bias_) bias = biased(count, in, nullptr, -1);
     over_groups(
         count, in,
         [&](const SweepInput<double>& one, size_t i) {
           std::vector<double> none(nv()), du(nv());
           const double* passive = in.passive ? in.passive + i * nv() : nullptr;
+          const double* turning = armature_bias_ ? bias.data() + i * nv() : none.data();
           size_t c = 0;
           const auto out = [&] { return loads + i * stride + c * n_load(); };
-          if (!each_alone(made(scalar), one, passive, none.data(), causes, du.data(), out,
-                          [&] { ++c; }))
+          if (!each_alone(made(scalar), one, {none.data(), turning, passive}, causes, du.data(),
+                          out, [&] { ++c; }))
             failed = scalar->failed_body();
         },
         [&](const SweepInput<Group>& group, size_t i) {
           none_.resize(nv());
           const Group* passive = pack(passive_, in.passive, nv(), i, count);
+          const Group* turning =
+              armature_bias_ ? pack(bias_, bias.data(), nv(), i, count) : none_.data();
           size_t c = 0;
           const auto store = [&] {
             unpack(out_b(), n_load(), i, count, loads + c++ * n_load(), stride);
           };
           if (!each_alone(
-                  made(on_lanes), group, passive, none_.data(), causes, out_a(),
+                  made(on_lanes), group, {none_.data(), turning, passive}, causes, out_a(),
                   [&] { return out_b(); }, store))
             failed = on_lanes->failed_body();
         });
@@ -79,6 +96,8 @@ struct BatchEvaluator::Work {
           if (tau) unpack(out_a(), nv(), i, count, tau);
           if (loads) unpack(out_b(), n_load(), i, count, loads);
         });
+    for (size_t i = 0; i < count && armature_bias_ && tau && in.v; ++i)
+      add_armature_bias(*model_, in.v + i * nv(), 1, tau + i * nv());
   }
 
   using Group = Lanes<native_lanes>;
@@ -126,30 +145,35 @@ struct BatchEvaluator::Work {
       for (size_t k = 0; k < n; ++k) to[(i + l) * stride + k] = from[k][l];
   }
 
-  /// The part of `all` that belongs to one cause; none: no torques.
+  /// Torques [nv] that belong to causes: to none, to velocities (of armatures), to passive forces.
   template <class S>
-  static SweepInput<S> alone(Cause cause, const SweepInput<S>& all, const S* passive,
-                             const S* none) {
+  struct Torques {
+    const S *none, *velocity, *passive;
+  };
+
+  /// The part of `all` that belongs to one cause.
+  template <class S>
+  static SweepInput<S> alone(Cause cause, const SweepInput<S>& all, const Torques<S>& torques) {
     SweepInput<S> in;
     in.q = all.q;
-    in.tau = none;
+    in.tau = cause == Cause::velocity ? torques.velocity : torques.none;
     in.gravity_factor = 0;
     if (cause == Cause::gravity) in.gravity_factor = all.gravity_factor;
     if (cause == Cause::velocity) in.v = all.v;
     if (cause == Cause::drive && all.tau) in.tau = all.tau;
     if (cause == Cause::motion) in.prescribed = all.prescribed;
-    if (cause == Cause::passive && passive) in.tau = passive;
+    if (cause == Cause::passive && torques.passive) in.tau = torques.passive;
     if (cause == Cause::external) in.external = all.external;
     return in;
   }
 
   /// Loads of each cause into out(), after which done() is called. False: not positive definite.
   template <class Kernel, class S, class Out, class Done>
-  static bool each_alone(Kernel& kernel, const SweepInput<S>& all, const S* passive, const S* none,
+  static bool each_alone(Kernel& kernel, const SweepInput<S>& all, const Torques<S>& torques,
                          std::span<const Cause> causes, S* du, Out&& out, Done&& done) {
     bool eliminated = false;
     for (const Cause cause : causes) {
-      const SweepInput<S> in = alone(cause, all, passive, none);
+      const SweepInput<S> in = alone(cause, all, torques);
       if (eliminated)
         kernel.evaluate_again(in, du, out());
       else if (!kernel.evaluate(in, du, out()))
@@ -188,9 +212,10 @@ struct BatchEvaluator::Work {
   }
 
   const Model* model_;
+  bool armature_bias_;
   std::unique_ptr<InverseDynamics<double>> inverse_;
   std::unique_ptr<InverseDynamics<Group>> inverse_lanes_;
-  std::vector<Group> q_, v_, tau_, du_, external_, passive_, none_, out_a_, out_b_;
+  std::vector<Group> q_, v_, tau_, du_, external_, passive_, bias_, none_, out_a_, out_b_;
 };
 
 BatchInput BatchInput::from(const Model& model, size_t first) const {
@@ -211,9 +236,15 @@ BatchEvaluator::~BatchEvaluator() = default;
 int BatchEvaluator::forward_dynamics(size_t count, const BatchInput& in, double* du, double* loads,
                                      BatchMethod method) {
   Work& w = *work_;
+  std::vector<double> tau;
+  BatchInput biased = in;
+  if (w.armature_bias()) {
+    tau = w.biased(count, in, in.tau, -1);
+    biased.tau = tau.data();
+  }
   return method == BatchMethod::constraint_force
-             ? w.forward_dynamics(w.elimination, w.elimination_lanes, count, in, du, loads)
-             : w.forward_dynamics(w.articulated, w.articulated_lanes, count, in, du, loads);
+             ? w.forward_dynamics(w.elimination, w.elimination_lanes, count, biased, du, loads)
+             : w.forward_dynamics(w.articulated, w.articulated_lanes, count, biased, du, loads);
 }
 
 int BatchEvaluator::loads_by_cause(size_t count, const BatchInput& in,

@@ -9,6 +9,7 @@
 #include "linkwise/dynamics/global_projection.hpp"
 #include "linkwise/dynamics/joint_space_conjugate_gradient.hpp"
 #include "linkwise/dynamics/piecewise.hpp"
+#include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/solve/direct/direct_solver.hpp"
 #include "linkwise/solve/registry.hpp"
 
@@ -108,6 +109,28 @@ constexpr DynamicsEntry table[] = {
      false, false, false, make_recursion<GlobalProjection>},
 };
 
+/// A method on a machine with armatures whose axes turn.
+class WithArmatureBias final : public DynamicsMethod {
+ public:
+  WithArmatureBias(const Model& model, std::unique_ptr<DynamicsMethod> method)
+      : model_(&model), method_(std::move(method)) {}
+  DynamicsReport evaluate(double t, const SweepInput<double>& in, double* du,
+                          double* loads) override {
+    SweepInput<double> with_bias = in;
+    tau_.assign(in.tau, in.tau + model_->nv());
+    if (in.v) add_armature_bias(*model_, in.v, -1, tau_.data());
+    with_bias.tau = tau_.data();
+    return method_->evaluate(t, with_bias, du, loads);
+  }
+  void accepted(double t) override { method_->accepted(t); }
+  std::span<const double> constraint_force() const override { return method_->constraint_force(); }
+
+ private:
+  const Model* model_;
+  std::unique_ptr<DynamicsMethod> method_;
+  std::vector<double> tau_;
+};
+
 }  // namespace
 
 std::span<const DynamicsEntry> dynamics_table() { return table; }
@@ -165,7 +188,9 @@ std::unique_ptr<DynamicsMethod> make_dynamics(const Model& model, const Dynamics
   DynamicsOptions resolved = options;
   resolved.method = choice.method;
   resolved.solver = choice.solver;
-  return find_dynamics(choice.method).make(model, resolved);
+  auto method = find_dynamics(choice.method).make(model, resolved);
+  if (!has_armature_bias(model)) return method;
+  return std::make_unique<WithArmatureBias>(model, std::move(method));
 }
 
 }  // namespace linkwise

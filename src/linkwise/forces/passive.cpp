@@ -18,9 +18,24 @@ void add_passive_forces(const Model& model, const double* q, const double* v, do
   const auto& upper = model.dof_values(DofProperty::upper);
   const auto& stop = model.dof_values(DofProperty::limit_stiffness);
   const auto& stop_damping = model.dof_values(DofProperty::limit_damping);
-  for (int i = 0; i < model.nv(); ++i) {
-    tau[i] -= damping[i] * v[i];
-    if (friction[i] > 0) tau[i] -= friction[i] * std::tanh(v[i] / friction_velocity[i]);
+  const auto resistance = [&](int i, double rate) {
+    double force = -damping[i] * rate;
+    if (friction[i] > 0) force -= friction[i] * std::tanh(rate / friction_velocity[i]);
+    return force;
+  };
+  for (const Element& e : model.elements) {
+    const int turning = info_of(e.kind).turning;
+    if (turning > 0) {
+      const Mat3<double> R = element_rotation(e, q);
+      const Vec3<double> rate = transpose_times(R, linear_part(e, v));
+      const Vec3<double> force =
+          R * Vec3<double>{resistance(e.v, rate.x), resistance(e.v + 1, rate.y),
+                           turning == 3 ? resistance(e.v + 2, rate.z) : 0};
+      tau[e.v] += force.x;
+      tau[e.v + 1] += force.y;
+      if (turning == 3) tau[e.v + 2] += force.z;
+    }
+    for (int i = e.v + turning; i < e.v + e.nv; ++i) tau[i] += resistance(i, v[i]);
   }
   for (const Element& e : model.elements) {
     if (!has_scalar_coordinates(e)) continue;

@@ -6,6 +6,7 @@
 namespace linkwise {
 
 /// Adds to tau [nv]: -damping u - friction tanh(u / friction_velocity) - stiffness (q - rest)
+/// with linear rates u of floating and planar joints along the axes of the previous frame,
 /// and at a limit passed by depth x > 0 with speed s outward: limit_stiffness x max(0, 1 +
 /// limit_damping s) back inward [hunt1975].
 void add_passive_forces(const Model& model, const double* q, const double* v, double* tau);

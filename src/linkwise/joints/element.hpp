@@ -2,6 +2,7 @@
 // One elementary motion of any kind, for the stacks that the general sweep walks element by
 // element: its transform, its columns of the motion subspace (constant in its own frame), and
 // dq/dt.
+#include <cmath>
 #include <cstdint>
 #include <string_view>
 
@@ -22,18 +23,19 @@ enum class ElementKind : std::uint8_t {
 /// What a kind has.
 struct ElementKindInfo {
   int nq, nv;
-  int quaternion;    ///< where in its coordinates x, y, z, w of a quaternion start, -1: none
-  const char* axis;  ///< what its axis is called, null where it has none
+  int quaternion;  ///< where in its coordinates x, y, z, w of a quaternion start, -1: none
+  int turning;     ///< how many of its first rates are linear, along axes that turn with the child
+  const char* axis;               ///< what its axis is called, null where it has none
   const char *q_units, *v_units;  ///< of its coordinates, and of the integrals of its rates
 };
 inline constexpr ElementKindInfo element_kind_table[] = {
-    {0, 0, -1, nullptr, "", ""},                               // fixed
-    {1, 1, -1, "revolute", "rad", "rad"},                      // revolute
-    {1, 1, -1, "prismatic", "m", "m"},                         // prismatic
-    {1, 1, -1, "helical", "rad", "rad"},                       // helical
-    {4, 3, 0, nullptr, "1 1 1 1", "rad rad rad"},              // spherical
-    {3, 3, -1, "normal", "m m rad", "m m rad"},                // planar
-    {7, 6, 3, nullptr, "m m m 1 1 1 1", "m m m rad rad rad"},  // floating
+    {0, 0, -1, 0, nullptr, "", ""},                               // fixed
+    {1, 1, -1, 0, "revolute", "rad", "rad"},                      // revolute
+    {1, 1, -1, 0, "prismatic", "m", "m"},                         // prismatic
+    {1, 1, -1, 0, "helical", "rad", "rad"},                       // helical
+    {4, 3, 0, 0, nullptr, "1 1 1 1", "rad rad rad"},              // spherical
+    {3, 3, -1, 2, "normal", "m m rad", "m m rad"},                // planar
+    {7, 6, 3, 3, nullptr, "m m m 1 1 1 1", "m m m rad rad rad"},  // floating
 };
 constexpr const ElementKindInfo& info_of(ElementKind kind) {
   return element_kind_table[static_cast<int>(kind)];
@@ -66,6 +68,23 @@ LW_INLINE Mat3<S> rotation_to_child(const S* quaternion) {
   return {{1.0 - k * (y * y + z * z), k * (x * y + z * w), k * (x * z - y * w), k * (x * y - z * w),
            1.0 - k * (x * x + z * z), k * (y * z + x * w), k * (x * z + y * w), k * (y * z - x * w),
            1.0 - k * (x * x + y * y)}};
+}
+
+/// Of an element with turning rates: components along the previous frame's axes -> the child's.
+inline Mat3<double> element_rotation(const Element& e, const double* q) {
+  if (e.kind == ElementKind::floating) return rotation_to_child(q + e.q + 3);
+  const double c = std::cos(q[e.q + 2]), s = std::sin(q[e.q + 2]);
+  return {c, s, 0, -s, c, 0, 0, 0, 1};
+}
+
+/// Its linear and its angular part of rates or forces v [nv]. In a plane z is 0, or all there is.
+inline Vec3<double> linear_part(const Element& e, const double* v) {
+  return {v[e.v], v[e.v + 1], info_of(e.kind).turning == 3 ? v[e.v + 2] : 0};
+}
+inline Vec3<double> angular_part(const Element& e, const double* v) {
+  const double* own = v + e.v + info_of(e.kind).turning;
+  return info_of(e.kind).turning == 2 ? Vec3<double>{0, 0, own[0]}
+                                      : Vec3<double>{own[0], own[1], own[2]};
 }
 
 /// Previous frame -> this frame; q is the whole configuration.

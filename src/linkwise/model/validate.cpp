@@ -206,6 +206,15 @@ void append_dof_properties(const JointSpec& joint, const std::string& where,
     }
   }
   const auto at = [&](DofProperty p, int i) { return dof[static_cast<int>(p)][start + i]; };
+  for (int k = 0, first = 0; k < n_joint_elements(joint); ++k) {
+    const ElementKindInfo& kind = info_of(joint_element(joint, k).kind);
+    for (int i = first + 1; i < first + kind.turning; ++i)
+      if (at(DofProperty::armature, i) != at(DofProperty::armature, first))
+        throw InputError(head +
+                         "armature differs between its linear degrees of freedom, whose axes turn "
+                         "with the child; give these the same value");
+    first += kind.nv;
+  }
   bool quaternion = false;
   for (int k = 0; k < n_joint_elements(joint); ++k)
     quaternion |= info_of(joint_element(joint, k).kind).quaternion >= 0;
