@@ -39,6 +39,20 @@ def test_the_algebraic_bound_sees_an_early_stop(rng):
     assert (said <= error + 1e-9).all()
 
 
+def test_bounds_cover_the_whole_time():
+    """Both runs have their peaks first, but later the truth may be higher than either."""
+    builder = lw.ModelBuilder("weight")
+    builder.add_link("ground")
+    builder.add_link("weight", mass=1.0, com=(0.5, 0, 0), inertia=np.eye(3))
+    builder.add_joint("bearing", "revolute", "ground", "weight", axis=[0, 0, 1])
+    runs = [lw.simulate(builder.build(), duration=1, every=0.1, tolerance=t) for t in (1e-6, 1e-8)]
+    np.testing.assert_allclose(runs[0].joint_load[:, 0, 2], 9.81)
+    for run, late in zip(runs, (0.9990, 0.9998), strict=True):
+        run.dataset["joint_load"][6:] *= late
+    found = lw.loads.bounds(*runs).integration.sel(quantity="force").item()
+    assert found == pytest.approx(9.81 * (0.9990 + 2 * 0.0008 - 1), rel=1e-6)
+
+
 def test_without_a_tighter_run_the_integration_is_not_known(swing):
     found = lw.loads.bounds(swing)
     assert np.isnan(found.integration).all()
