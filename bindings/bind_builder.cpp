@@ -75,11 +75,15 @@ LinkSpec link_spec(std::string name, double mass, nb::handle com, nb::handle ine
                    inertia.is_none() ? Mat3<double>{} : mat3(inertia, "inertia"));
 }
 
-void bind_builder(nb::module_& m) {
+namespace {
+
+void bind_note(nb::module_& m) {
   nb::class_<Note>(m, "Note", "What building a model merged, or warns about.")
-      .def_prop_ro("level", [](const Note& n) { return note_level_name(n.level); })
-      .def_ro("element", &Note::element)
-      .def_ro("text", &Note::text)
+      .def_prop_ro(
+          "level", [](const Note& n) { return note_level_name(n.level); },
+          "\"merge\", \"warning\" or \"info\".")
+      .def_ro("element", &Note::element, "The link or joint that it is about.")
+      .def_ro("text", &Note::text, "What was done or is to be known, in one sentence.")
       .def("__getstate__",
            [](const Note& n) { return std::tuple(static_cast<int>(n.level), n.element, n.text); })
       .def("__setstate__",
@@ -88,7 +92,18 @@ void bind_builder(nb::module_& m) {
              new (&n) Note{static_cast<NoteLevel>(level), element, text};
            })
       .def("__repr__", [](const Note& n) { return "Note(" + n.element + ": " + n.text + ")"; });
+}
 
+void bind_chain(nb::module_& m) {
+  m.def("make_chain", &chain_of, "n_bodies"_a, nb::kw_only(), "joint"_a, "axes"_a, "translation"_a,
+        "mass"_a, "com"_a, "inertia"_a, "gravity"_a, "damping"_a = 0.0, "armature"_a = 0.0,
+        "floating_base"_a = false);
+}
+
+}  // namespace
+
+void bind_builder(nb::module_& m) {
+  bind_note(m);
   nb::class_<ModelBuilder>(
       m, "ModelBuilder",
       "Collects links and joints by name; build() checks them and gives the immutable Model.\n\n"
@@ -101,53 +116,71 @@ void bind_builder(nb::module_& m) {
             if (gravity.is_none()) gravity = nb::make_tuple(0.0, 0.0, -9.81);
             new (self) ModelBuilder(std::move(name), vec3(gravity, "gravity"), std::move(source));
           },
-          "name"_a = "model", nb::kw_only(), "gravity"_a = nb::none(), "source"_a = "")
+          "name"_a = "model", nb::kw_only(), "gravity"_a = nb::none(), "source"_a = "",
+          "name of the machine; gravity (3,) [m/s2] in world axes, None: (0, 0, -9.81); source: "
+          "the file that messages name.")
       .def(
           "add_link",
           [](ModelBuilder& self, std::string name, double mass, nb::handle com,
              nb::handle inertia) { self.add_link(link_spec(std::move(name), mass, com, inertia)); },
           "name"_a, nb::kw_only(), "mass"_a = 0.0, "com"_a = nb::none(), "inertia"_a = nb::none(),
-          "Adds a link: mass [kg], centre of mass (3,) [m] in the link frame, inertia (3, 3) [kg "
-          "m2] about the\n"
-          "centre of mass in link axes.")
+          R"(Adds a link.
+
+Args:
+    name: unique among links.
+    mass: [kg]; com: centre of mass (3,) [m]; inertia: (3, 3) [kg m2] about it. All in the link's
+        frame; None: zero.
+
+Raises:
+    InputError: an array has another shape, or a number is not finite.)")
       .def("add_joint", &add_joint, "name"_a, "type"_a, "parent"_a, "child"_a, nb::kw_only(),
            "translation"_a = nb::none(), "rotation"_a = nb::none(), "axis"_a = nb::none(),
            "axes"_a = nb::none(), "pitch"_a = 0.0, "initial"_a = nb::none(), "properties"_a,
-           "Adds a joint between two links.\n\n"
-           "type: fixed, revolute, continuous, prismatic, helical, cylindrical, universal, "
-           "spherical, planar,\n"
-           "floating or composite. translation (3,) [m] and rotation (3, 3) place the joint frame "
-           "in the parent link\n"
-           "frame; axis (3,) in the joint frame (normal of a planar joint); axes: two for "
-           "universal, a list of\n"
-           "(kind, axis) or (\"helical\", axis, pitch) for composite; pitch [m/rad];\n"
-           "initial: the joint's coordinates where a simulation starts, its zero position by "
-           "default.\n"
-           "Properties, one value or one per degree of freedom: damping, friction, "
-           "friction_velocity, stiffness,\n"
-           "rest_position, armature, lower, upper, effort, velocity, limit_stiffness, "
-           "limit_damping.")
-      .def(
-          "add_note", &ModelBuilder::add_note, "level"_a, "element"_a, "text"_a,
-          "Adds a note for Model.notes, as readers of files do about what they leave out; level is "
-          "\"merge\",\n"
-          "\"warning\" or \"info\".")
+           R"(Adds a joint between two links.
+
+Args:
+    name: unique among joints.
+    type: fixed, revolute, continuous, prismatic, helical, cylindrical, universal, spherical,
+        planar, floating or composite.
+    parent, child: names of links.
+    translation: (3,) [m]; rotation: (3, 3). They place the joint frame in the parent link's frame;
+        None: in its origin, parallel to it.
+    axis: (3,) in the joint frame, the normal of a planar joint; None: z.
+    axes: two for universal, a list of (kind, axis) or ("helical", axis, pitch) for composite.
+    pitch: of helical [m/rad].
+    initial: the joint's coordinates [rad, m] where a simulation starts; None: its zero position.
+    properties: damping, friction, friction_velocity, stiffness, rest_position, armature, lower,
+        upper, effort, velocity, limit_stiffness, limit_damping; one value, or one per degree of
+        freedom. The units are those of Model.damping and so on.
+
+Raises:
+    InputError: a type, property or shape is wrong; what concerns several elements, build checks.)")
+      .def("add_note", &ModelBuilder::add_note, "level"_a, "element"_a, "text"_a,
+           R"(Adds a note for Model.notes, as readers of files do about what they leave out.
+
+Args:
+    level: "merge", "warning" or "info"; element: the link or joint; text: one sentence.
+
+Raises:
+    InputError: the level is unknown.)")
       .def("set_floating_base", &ModelBuilder::set_floating_base, "joint_name"_a = "root_joint",
-           "The root link floats on a joint of this name instead of being welded to the ground.")
+           R"(The root link floats on a joint of this name (joint_name) instead of being welded to
+the ground.)")
       .def(
           "build",
           [](const ModelBuilder& self, bool keep_fixed) {
             return new PyModel(self.spec(keep_fixed));
           },
           nb::kw_only(), "keep_fixed"_a = false,
-          "Checks everything and builds the Model; InputError names the element and the remedy. "
-          "keep_fixed keeps\n"
-          "fixed joints that carry mass as joints with a load instead of merging the child "
-          "into its parent.");
+          R"(Checks everything and builds the Model.
 
-  m.def("make_chain", &chain_of, "n_bodies"_a, nb::kw_only(), "joint"_a, "axes"_a, "translation"_a,
-        "mass"_a, "com"_a, "inertia"_a, "gravity"_a, "damping"_a = 0.0, "armature"_a = 0.0,
-        "floating_base"_a = false);
+Args:
+    keep_fixed: keeps fixed joints that carry mass as joints with a load, instead of merging
+        the child into its parent.
+
+Raises:
+    InputError: what is wrong, with the element and the remedy.)");
+  bind_chain(m);
 }
 
 }  // namespace linkwise::bindings

@@ -168,19 +168,28 @@ PyReport report_of(const ReportState& state) {
 using ForwardState = std::tuple<nb::object, nb::object, nb::object, ReportState>;
 
 void bind_results(nb::module_& m) {
-  nb::exception<NumericsError>(m, "NumericsError", PyExc_RuntimeError).attr("__module__") =
-      "linkwise";
+  nb::exception<NumericsError> numerics_error(m, "NumericsError", PyExc_RuntimeError);
+  numerics_error.attr("__module__") = "linkwise";
+  numerics_error.attr("__doc__") =
+      "A computation failed: one line with the method, the body and the remedy.";
   nb::class_<PyReport>(m, "Report", "How an evaluation went.")
-      .def_prop_ro("outcome", [](const PyReport& r) { return std::string(to_string(r.outcome)); })
-      .def_prop_ro("method", [](const PyReport& r) { return r.choice.method; })
-      .def_prop_ro("solver", [](const PyReport& r) { return r.choice.solver; })
+      .def_prop_ro(
+          "outcome", [](const PyReport& r) { return std::string(to_string(r.outcome)); },
+          "\"converged\", or what went wrong in the worst of the states.")
+      .def_prop_ro(
+          "method", [](const PyReport& r) { return r.choice.method; },
+          "The name of the method that computed it.")
+      .def_prop_ro(
+          "solver", [](const PyReport& r) { return r.choice.solver; },
+          "The name of the linear solver; empty where the method uses none.")
       .def_prop_ro(
           "reason", [](const PyReport& r) { return r.choice.reason; },
           "Why this method and solver.")
       .def_ro("body", &PyReport::body_name, "Where it failed, or empty.")
-      .def_ro("iterations", &PyReport::iterations)
+      .def_ro("iterations", &PyReport::iterations,
+              "Iterations of the linear solver; 0 of a direct one.")
       .def_ro("error_estimate", &PyReport::error_estimate,
-              "Relative A-norm error of the constraint forces.")
+              "Estimated error of the constraint forces in the A-norm, relative to them.")
       .def("__getstate__", &state_of)
       .def("__setstate__",
            [](PyReport& r, const ReportState& state) { new (&r) PyReport(report_of(state)); })
@@ -189,13 +198,13 @@ void bind_results(nb::module_& m) {
                (r.choice.solver.empty() ? "" : ", solver " + r.choice.solver) + ", " +
                std::to_string(r.iterations) + " iterations)";
       });
-  nb::class_<ForwardResult>(m, "ForwardDynamicsResult")
-      .def_ro("acceleration", &ForwardResult::acceleration, "(..., nv)")
+  nb::class_<ForwardResult>(m, "ForwardDynamicsResult", "What forward_dynamics(full=True) returns.")
+      .def_ro("acceleration", &ForwardResult::acceleration, "dv/dt (..., nv) [rad/s2, m/s2].")
       .def_ro("joint_load", &ForwardResult::joint_load,
-              "(..., n_joints, 6), N and N m, joint frame, joint point.")
+              "(..., n_joints, 6) [N, N m], as of joint_loads.")
       .def_ro("constraint_force", &ForwardResult::constraint_force,
-              "(..., unknowns) of A f = b, or None.")
-      .def_ro("report", &ForwardResult::report)
+              "f (..., unknowns) [N, N m] of A f = b [sharf1993]; None of a method without it.")
+      .def_ro("report", &ForwardResult::report, "How it went: a Report.")
       .def("__getstate__",
            [](const ForwardResult& r) {
              return ForwardState(r.acceleration, r.joint_load, r.constraint_force,
@@ -224,25 +233,30 @@ void bind_forward(nb::module_& m) {
       "tolerance"_a = nb::none(), "stop"_a = nb::none(), "max_iterations"_a = nb::none(),
       "solver_options"_a = nb::none(), "threads"_a = nb::none(), "full"_a = false,
       "gravity"_a = 1.0, "prescribed"_a = nb::none(),
-      "Accelerations dv/dt (..., nv) [rad/s2, m/s2] of q (..., nq), v (..., nv), tau (..., nv); "
-      "leading axes broadcast.\n\n"
-      "external (..., n_joints, 6): wrench [N, N m] on each body at its joint frame's origin, in "
-      "that frame, force\n"
-      "first. passive adds the model's damping, friction, springs and stops to tau. method and "
-      "solver: names as in\n"
-      "linkwise.methods() and linkwise.solvers(), \"auto\" chooses; tolerance, stop and "
-      "max_iterations concern\n"
-      "iterative solvers (1e-12 by default); solver_options is a dictionary of further ones (keys "
-      "as in "
-      "linkwise.solver_options()) and goes first.\n"
-      "threads: by default LINKWISE_THREADS or all cores; the result is the same to the last bit.\n"
-      "full returns a ForwardDynamicsResult with joint loads, constraint "
-      "forces and Report.\n"
-      "gravity multiplies the model's gravity, 0 leaves it out; prescribed (..., nv) holds the "
-      "accelerations of the joints\n"
-      "of model.prescribe, the other entries are not read.\n"
-      "Raises InputError (a ValueError) on wrong shapes or values, NumericsError when the method "
-      "fails.");
+      R"(Accelerations that torques cause, by the method asked for.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
+        tau: joint torques and forces (..., nv) [N m, N], None: zero. Leading axes broadcast.
+    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
+        point, in its joint frame, force first; None: no wrench.
+    passive: adds the model's damping, friction, springs and stops to tau.
+    method, solver: names as in linkwise.methods() and linkwise.solvers(), which cite their
+        sources; "auto" chooses.
+    tolerance, stop, max_iterations: of iterative solvers; None: 1e-12 by the energy norm.
+    solver_options: further options by name, as in linkwise.solver_options(); they go first.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+    full: return everything.
+    gravity: factor on the model's gravity, 0 leaves it out.
+    prescribed: accelerations (..., nv) of the joints of Model.prescribe; the others are not read.
+
+Returns:
+    dv/dt (..., nv) [rad/s2, m/s2]; with full a ForwardDynamicsResult.
+
+Raises:
+    InputError: a name is unknown, shapes do not fit the model, or a number is not finite.
+    NumericsError: the method failed; not with full, whose report says so.)");
 }
 
 void bind_inverse(nb::module_& m) {
@@ -254,8 +268,23 @@ void bind_inverse(nb::module_& m) {
       },
       "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
       "external"_a = nb::none(), "gravity"_a = 1.0, "threads"_a = nb::none(),
-      "tau (..., nv) [N m, N] that gives the acceleration (..., nv) at q, v: Newton-Euler "
-      "recursion, armature included.");
+      R"(Joint torques that a motion takes, by the recursion of Newton and Euler [luh1980].
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
+        acceleration: dv/dt (..., nv) [rad/s2, m/s2], None: zero. Leading axes broadcast.
+    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
+        point, in its joint frame, force first; None: no wrench.
+    gravity: factor on the model's gravity, 0 leaves it out.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    tau (..., nv) [N m, N], the torque of the rotors (armature) included. It is the total: less
+    passive_torque it is what the drives give.
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "inverse_dynamics_loads",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
@@ -264,17 +293,46 @@ void bind_inverse(nb::module_& m) {
       },
       "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
       "external"_a = nb::none(), "gravity"_a = 1.0, "threads"_a = nb::none(),
-      "Joint loads (..., n_joints, 6) of a given motion, frames and signs as in joint_loads; "
-      "gravity "
-      "multiplies the\n"
-      "model's gravity.");
+      R"(Joint loads of a given motion, by the recursion of Newton and Euler [luh1980].
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
+        acceleration: dv/dt (..., nv) [rad/s2, m/s2], None: zero. Leading axes broadcast.
+    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
+        point, in its joint frame, force first; None: no wrench.
+    gravity: factor on the model's gravity, 0 leaves it out.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (..., n_joints, 6) [N, N m]: as of joint_loads.
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)");
   m.def("joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
         nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
         "solver"_a = "auto", "threads"_a = nb::none(),
-        "Joint loads (..., n_joints, 6) [N, N m] of the motion that tau causes: the wrench that "
-        "the inboard body exerts on\n"
-        "the outboard body through the joint, at the joint point, in the joint's outboard frame, "
-        "force first.");
+        R"(Joint loads of the motion that torques cause: w_n = M_n a_n + p_n + the loads outboard
+[luh1980].
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
+        tau: joint torques and forces (..., nv) [N m, N], None: zero. Leading axes broadcast.
+    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
+        point, in its joint frame, force first; None: no wrench.
+    passive: adds the model's damping, friction, springs and stops to tau.
+    method, solver: as of forward_dynamics.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (..., n_joints, 6) [N, N m]: the wrench that the inboard body exerts on the outboard body
+    through the joint, drive and passive forces included, at the joint point, in the joint frame
+    of the outboard body, force first.
+
+Raises:
+    InputError: a name is unknown, shapes do not fit the model, or a number is not finite.
+    NumericsError: the method failed.)");
 }
 
 }  // namespace
@@ -283,9 +341,14 @@ void bind_dynamics(nb::module_& m) {
   bind_results(m);
   bind_forward(m);
   bind_inverse(m);
-  m.def("solvers", &solver_list, "The table of linear solvers, as dictionaries.");
-  m.def("methods", &method_list, "The table of dynamics methods, as dictionaries.");
-  m.def("integrators", &integrator_list, "The table of integrators, as dictionaries.");
+  m.def(
+      "solvers", &solver_list,
+      "The table of linear solvers: dictionaries of name, description, kind, parallel, reference.");
+  m.def("methods", &method_list,
+        "The table of dynamics methods: dictionaries of name, description, reference, uses_solver, "
+        "chains_only, linear_time.");
+  m.def("integrators", &integrator_list,
+        "The table of integrators: dictionaries of name, description, fixed_step.");
 }
 
 }  // namespace linkwise::bindings

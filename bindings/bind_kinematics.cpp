@@ -33,7 +33,7 @@ nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, std::opti
   return s.lead.empty() && tail.empty() ? nb::object(nb::float_(out.data[0])) : out.array;
 }
 
-void bind_forces_and_energies(nb::module_& m) {
+void bind_forces(nb::module_& m) {
   m.def(
       "mass_matrix",
       [](const PyModel& self, nb::handle q, std::optional<int> threads) {
@@ -47,7 +47,19 @@ void bind_forces_and_energies(nb::module_& m) {
         return H.array;
       },
       "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Joint-space mass matrix (..., nv, nv), armature included.");
+      R"(Joint-space mass matrix H with H dv/dt + bias = tau, by composite rigid bodies
+[walker1982].
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m].
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    H (..., nv, nv) [kg m2, kg m, kg], symmetric, armatures on its diagonal.
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "passive_torque",
       [](const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads) {
@@ -58,7 +70,21 @@ void bind_forces_and_energies(nb::module_& m) {
                           });
       },
       "model"_a, "q"_a, "v"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Torque (..., nv) [N m, N] of the joints' own damping, friction, springs and stops.");
+      R"(Torque of the joints' own damping, friction, springs and compliant stops.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]. Leading axes broadcast.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (..., nv) [N m, N], to be added to the drives' torque; docs/theory/forces.md has the laws.
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)");
+}
+
+void bind_energies(nb::module_& m) {
   m.def(
       "kinetic_energy",
       [](const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads) {
@@ -68,7 +94,18 @@ void bind_forces_and_energies(nb::module_& m) {
                           });
       },
       "model"_a, "q"_a, "v"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Kinetic energy (...) [J], rotors (armature) included.");
+      R"(Kinetic energy of the bodies and of the rotors (armature), v^T H v / 2.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]. Leading axes broadcast.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (...) [J].
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "potential_energy",
       [](const PyModel& self, nb::handle q, std::optional<int> threads) {
@@ -78,7 +115,18 @@ void bind_forces_and_energies(nb::module_& m) {
                           });
       },
       "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Potential energy (...) [J] of gravity (zero at the world origin), springs and stops.");
+      R"(Potential energy of gravity (zero at the world origin), joint springs and stops.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m].
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (...) [J].
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "momentum",
       [](const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads) {
@@ -88,8 +136,18 @@ void bind_forces_and_energies(nb::module_& m) {
                           });
       },
       "model"_a, "q"_a, "v"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Linear [kg m/s] and angular [kg m2/s] momentum (..., 6) about the world origin, world "
-      "axes.");
+      R"(Momentum of all bodies about the world origin, in world axes; rotors are left out.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]. Leading axes broadcast.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (..., 6): linear [kg m/s], then angular [kg m2/s].
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)");
 }
 
 /// The joint of a body given by the name of its link or by index.
@@ -121,9 +179,18 @@ void bind_poses(nb::module_& m) {
                           });
       },
       "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Poses (..., n_joints, 4, 4) of the joint frames, each fixed in its joint's child link: 4 x "
-      "4 "
-      "matrices that take points of that frame to the world, m.");
+      R"(Poses of the joint frames, each fixed in its joint's child link.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m].
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (..., n_joints, 4, 4): matrices that take points [m] of a joint frame to the world.
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "link_poses",
       [](const PyModel& self, nb::handle q, std::optional<int> threads) {
@@ -133,7 +200,19 @@ void bind_poses(nb::module_& m) {
                           });
       },
       "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Poses (..., links, 4, 4) of all links of the source, merged ones too, in the world.");
+      R"(Poses of all links of the source, merged ones too.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m].
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (..., links, 4, 4) in the order of Model.link_names: matrices that take points [m] of a link's
+    frame to the world.
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "body_jacobian",
       [](const PyModel& self, nb::handle q, nb::handle body, std::optional<int> threads) {
@@ -144,8 +223,22 @@ void bind_poses(nb::module_& m) {
                           });
       },
       "model"_a, "q"_a, "body"_a, nb::kw_only(), "threads"_a = nb::none(),
-      "Jacobian (..., 6, nv) of a body's frame in its own axes, linear first; body: name or "
-      "index.");
+      R"(Geometric Jacobian J of a body [featherstone2008, ch. 2]: J v is the velocity of its joint
+frame.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m].
+    body: name of a joint's child link, or the index of the joint.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    J (..., 6, nv): rows are the velocity of the joint point [m/s] and the angular velocity [rad/s],
+    in the axes of the joint frame.
+
+Raises:
+    InputError: the body is unknown or welded to another, shapes do not fit the model, or a number
+        is not finite.)");
 }
 
 }  // namespace
@@ -153,7 +246,8 @@ void bind_poses(nb::module_& m) {
 void bind_kinematics(nb::module_& m) {
   m.def("require_memory", &require_memory, "bytes"_a, "what"_a,
         "MemoryError, with the estimate, where so many bytes are not available.");
-  bind_forces_and_energies(m);
+  bind_forces(m);
+  bind_energies(m);
   bind_poses(m);
 }
 

@@ -110,10 +110,13 @@ nb::object link_inertias(const PyModel& self) {
 }
 
 void bind_sizes(ModelClass& c) {
-  c.def_prop_ro("name", [](const PyModel& s) { return s.model->spec().name; })
-      .def_prop_ro("source", [](const PyModel& s) { return s.model->spec().source; })
+  c.def_prop_ro(
+       "name", [](const PyModel& s) { return s.model->spec().name; }, "The machine's name.")
       .def_prop_ro(
-          "nq", [](const PyModel& s) { return s.model->nq(); }, "Length of q.")
+          "source", [](const PyModel& s) { return s.model->spec().source; },
+          "The file it was read from; empty for a machine built in a program.")
+      .def_prop_ro(
+          "nq", [](const PyModel& s) { return s.model->nq(); }, "Coordinates: length of q.")
       .def_prop_ro(
           "nv", [](const PyModel& s) { return s.model->nv(); },
           "Degrees of freedom: length of v and tau.")
@@ -127,28 +130,27 @@ void bind_sizes(ModelClass& c) {
           "have no mass.")
       .def_prop_ro(
           "total_mass", [](const PyModel& s) { return s.model->total_mass(); },
-          "Mass of the moving bodies, kg.")
+          "Mass of the moving bodies [kg].")
       .def_prop_ro(
           "gravity",
           [](const PyModel& s) {
             const auto& g = s.model->gravity;
             return to_numpy({g.x, g.y, g.z});
           },
-          nb::rv_policy::move, "m/s2, world axes.")
+          nb::rv_policy::move, "(3,) [m/s2], world axes.")
       .def_prop_ro(
           "notes", [](const PyModel& s) { return s.model->notes; },
-          "What was merged and what to beware of.")
+          "What was merged and what to beware of: a list of Note.")
       .def_prop_ro("hash", &hash_of, "SHA-256 of the model's description, hexadecimal.")
       .def(
           "neutral_configuration",
           [](const PyModel& s) { return to_numpy(s.model->neutral_configuration()); },
-          "q (nq,) at the zero position: zeros, quaternions 0, 0, 0, 1.")
+          "Positions q (nq,) [rad, m] at zero: zeros, quaternions 0, 0, 0, 1.")
       .def(
           "initial_configuration",
           [](const PyModel& s) { return to_numpy(s.model->initial_configuration()); },
-          "q (nq,) where simulations start unless told otherwise: as the file draws the machine, "
-          "which is the\n"
-          "zero position but for the free bodies of an MJCF.")
+          "Positions q (nq,) [rad, m] where simulations start unless told otherwise: as the file "
+          "draws the machine, which is the zero position but for the free bodies of an MJCF.")
       .def("__repr__", [](const PyModel& s) {
         return "<linkwise.Model '" + s.model->spec().name +
                "': " + std::to_string(s.model->n_joints()) + " joints, nq " +
@@ -157,23 +159,30 @@ void bind_sizes(ModelClass& c) {
 }
 
 void bind_joints(ModelClass& c) {
-  c.def_prop_ro("joint_names",
-                [](const PyModel& s) {
-                  return list_per_joint(s, [](const JointInfo& j) { return j.name; });
-                })
-      .def_prop_ro("joint_types",
-                   [](const PyModel& s) {
-                     return list_per_joint(
-                         s, [](const JointInfo& j) { return joint_type_name(j.type); });
-                   })
-      .def_prop_ro("joint_nq",
-                   [](const PyModel& s) {
-                     return list_per_joint(s, [](const JointInfo& j) { return j.nq; });
-                   })
-      .def_prop_ro("joint_nv",
-                   [](const PyModel& s) {
-                     return list_per_joint(s, [](const JointInfo& j) { return j.nv; });
-                   })
+  c.def_prop_ro(
+       "joint_names",
+       [](const PyModel& s) {
+         return list_per_joint(s, [](const JointInfo& j) { return j.name; });
+       },
+       "Joints that carry a load, in the order of all that is per joint.")
+      .def_prop_ro(
+          "joint_types",
+          [](const PyModel& s) {
+            return list_per_joint(s, [](const JointInfo& j) { return joint_type_name(j.type); });
+          },
+          "Type of each joint, as in ModelBuilder.add_joint.")
+      .def_prop_ro(
+          "joint_nq",
+          [](const PyModel& s) {
+            return list_per_joint(s, [](const JointInfo& j) { return j.nq; });
+          },
+          "Coordinates of each joint; they add up to nq.")
+      .def_prop_ro(
+          "joint_nv",
+          [](const PyModel& s) {
+            return list_per_joint(s, [](const JointInfo& j) { return j.nv; });
+          },
+          "Degrees of freedom of each joint; they add up to nv.")
       .def_prop_ro(
           "joint_parents", [](const PyModel& s) { return s.model->joint_parents(); },
           "Index of the joint inboard of each joint, -1 at the ground.")
@@ -207,25 +216,34 @@ void bind_joints(ModelClass& c) {
             return to_numpy(masses);
           },
           nb::rv_policy::move,
-          "Mass of the child link of each joint (n_joints,) in kg, with what was welded to it.")
-      .def(
-          "joint_index",
-          [](const PyModel& s, const std::string& name) { return s.model->joint_index(name); },
-          "name"_a)
+          "Mass (n_joints,) [kg] of the child link of each joint, with what was welded to it; 0 "
+          "where it "
+          "has none.");
+}
+
+void bind_places(ModelClass& c) {
+  c.def(
+       "joint_index",
+       [](const PyModel& s, const std::string& name) { return s.model->joint_index(name); },
+       "name"_a,
+       "Position of a joint in all that is per joint, by its name; InputError if unknown.")
       .def(
           "q_slice",
           [](const PyModel& s, const std::string& name) {
             const JointInfo& j = s.model->joints[s.model->joint_index(name)];
             return slice_of(j.q, j.nq);
           },
-          "joint"_a, "Where the joint's coordinates are in q.")
+          "joint"_a,
+          "Where the coordinates of a joint are in q, by its name; InputError if unknown.")
       .def(
           "v_slice",
           [](const PyModel& s, const std::string& name) {
             const JointInfo& j = s.model->joints[s.model->joint_index(name)];
             return slice_of(j.v, j.nv);
           },
-          "joint"_a, "Where the joint's rates are in v, tau and accelerations.");
+          "joint"_a,
+          "Where the rates of a joint are in v, tau and accelerations, by its name; InputError if "
+          "unknown.");
 }
 
 void bind_dof_properties(ModelClass& c) {
@@ -234,14 +252,18 @@ void bind_dof_properties(ModelClass& c) {
       [](const PyModel& s, const std::string& name) {
         return to_numpy(s.model->dof_values(dof_property_from_name(name)));
       },
-      "name"_a, "A joint property as an array (nv,); names as in ModelBuilder.add_joint.");
+      "name"_a,
+      "A joint property (nv,) by its name, as in ModelBuilder.add_joint, in the unit that the "
+      "attribute states (damping: [N m s/rad, N s/m]); InputError if unknown.");
   for (int p = 0; p < n_dof_properties; ++p) {
     std::string attribute = dof_property_table[p].name;
     for (const char* limit : {"lower", "upper", "effort", "velocity"})
       if (attribute == limit) attribute += "_limit";
     const nb::object getter = nb::cpp_function(
         [p](const PyModel& s) { return to_numpy(s.model->dof[p]); }, nb::is_method());
-    c.attr(attribute.c_str()) = nb::module_::import_("builtins").attr("property")(getter);
+    c.attr(attribute.c_str()) =
+        nb::module_::import_("builtins")
+            .attr("property")(getter, nb::none(), nb::none(), dof_property_table[p].text);
   }
 }
 
@@ -261,29 +283,50 @@ void bind_links(ModelClass& c) {
             for (const LinkSpec& link : s.model->spec().links) masses.push_back(link.mass);
             return to_numpy(masses);
           },
-          nb::rv_policy::move, "Mass of each link (n_links,) in kg, in the order of link_names.")
+          nb::rv_policy::move,
+          "Mass of each link (n_links,) [kg], in the order of link_names, as the source gives it.")
       .def_prop_ro("link_centers_of_mass", &link_centers_of_mass, nb::rv_policy::move,
-                   "Centre of mass of each link (n_links, 3) in m, in the link's frame.")
+                   "Centre of mass of each link (n_links, 3) [m], in the link's frame.")
       .def_prop_ro(
           "link_inertias", &link_inertias, nb::rv_policy::move,
-          "Inertia of each link (n_links, 3, 3) in kg m2 about its centre of mass, link axes.");
+          "Inertia of each link (n_links, 3, 3) [kg m2] about its centre of mass, link axes.");
 }
 
 void bind_variants(ModelClass& c) {
   c.def("prescribe", &prescribe, "joints"_a, nb::rv_policy::take_ownership,
-        "The same machine with the motion of these joints given: forward_dynamics takes their "
-        "accelerations\n"
-        "(prescribed=) and finds those of the others.")
+        R"(The same machine with the motion of these joints given.
+
+forward_dynamics takes their accelerations (prescribed=) and finds those of the others, and the
+torque of the given motion is part of the joint load.
+
+Args:
+    joints: names.
+
+Raises:
+    InputError: a joint is unknown.)")
       .def("with_payload", &payload_on, "link"_a, nb::kw_only(), "mass"_a, "com"_a = nb::none(),
            "inertia"_a = nb::none(), "name"_a = "payload", nb::rv_policy::take_ownership,
-           "The same machine with a body welded to a link: mass [kg], centre of mass [m] and "
-           "inertia about it\n"
-           "[kg m2] in that link's frame.")
+           R"(The same machine with a body welded to a link.
+
+Args:
+    link: its name.
+    mass: [kg]; com: centre of mass (3,) [m]; inertia: (3, 3) [kg m2] about it. All in that link's
+        frame; None: zero.
+    name: of the new link.
+
+Raises:
+    InputError: the link is unknown, the name taken, or no body has such an inertia.)")
       .def("with_link", &with_link, "link"_a, nb::kw_only(), "mass"_a = nb::none(),
            "com"_a = nb::none(), "inertia"_a = nb::none(), nb::rv_policy::take_ownership,
-           "The same machine with another mass [kg], centre of mass [m] or inertia about it "
-           "[kg m2] of one link;\n"
-           "what is None stays.")
+           R"(The same machine with other inertial data of one link; what is None stays.
+
+Args:
+    link: its name.
+    mass: [kg]; com: centre of mass (3,) [m]; inertia: (3, 3) [kg m2] about it. All in that link's
+        frame.
+
+Raises:
+    InputError: the link is unknown, or no body has such an inertia.)")
       .def(
           "to_bytes",
           [](const PyModel& s, const nb::object& source) {
@@ -292,14 +335,14 @@ void bind_variants(ModelClass& c) {
             return to_bytes(spec);
           },
           nb::kw_only(), "source"_a = nb::none(),
-          "The model's description, for from_bytes. source replaces Model.source in it, which may "
-          "be a path.")
+          R"(The model's description, for from_bytes. source replaces Model.source in it, which may
+be a path; None keeps it.)")
       .def_static(
           "from_bytes",
           [](const nb::bytes& description) { return new PyModel(from_bytes(description)); },
           "description"_a,
-          "The Model that to_bytes described. Runs no code, unlike pickle; InputError for bytes "
-          "that are no model.")
+          R"(The Model whose description to_bytes gave. Runs no code, unlike pickle; InputError for
+bytes that are no model.)")
       .def("__getstate__", [](const PyModel& s) { return to_bytes(s.model->spec()); })
       .def("__setstate__",
            [](PyModel& s, const nb::bytes& state) { new (&s) PyModel(from_bytes(state)); });
@@ -311,6 +354,7 @@ void bind_model(nb::module_& m) {
   ModelClass c(m, "Model", "An immutable multibody tree, safe to share between threads; pickles.");
   bind_sizes(c);
   bind_joints(c);
+  bind_places(c);
   bind_dof_properties(c);
   bind_links(c);
   bind_variants(c);

@@ -1,5 +1,6 @@
 // Solvers from Python: the tables of guesses, stop rules and options; the system A f = b of a model
-// at a state, to look at and to solve; and an evaluator that keeps its warm starts between calls.
+// at a state, to look at and to solve; and a dynamics method that keeps its warm starts between
+// calls.
 #include <chrono>
 
 #include <nanobind/nanobind.h>
@@ -251,9 +252,9 @@ nb::object PyConstraintSystem::sparse() const {
 }
 
 /// A dynamics method with its memory of earlier times, and its clock.
-class PyEvaluator {
+class PyDynamicsMethod {
  public:
-  PyEvaluator(const PyModel& owner, DynamicsOptions options)
+  PyDynamicsMethod(const PyModel& owner, DynamicsOptions options)
       : model_(owner.model),
         choice_(choose_dynamics(*owner.model, options)),
         options_(std::move(options)),
@@ -290,8 +291,8 @@ class PyEvaluator {
   std::unique_ptr<DynamicsMethod> method_;
 };
 
-nb::dict PyEvaluator::follow(nb::handle times_in, nb::handle q, nb::handle v, nb::handle tau,
-                             nb::handle external, bool passive, double time_limit) {
+nb::dict PyDynamicsMethod::follow(nb::handle times_in, nb::handle q, nb::handle v, nb::handle tau,
+                                  nb::handle external, bool passive, double time_limit) {
   const Model& m = *model_;
   const StateRows rows(m, q, v, tau, external, passive, 1);
   const ArrayIn times = as_array(times_in, "times");
@@ -357,12 +358,15 @@ nb::list stop_rule_list() {
   return out;
 }
 
-void bind_system(nb::module_& m) {
-  nb::class_<Spectrum>(m, "Spectrum", "Extreme eigenvalues of D^-1 A, D the block diagonal of A.")
-      .def_ro("smallest", &Spectrum::smallest)
-      .def_ro("largest", &Spectrum::largest)
+void bind_spectrum(nb::module_& m) {
+  nb::class_<Spectrum>(
+      m, "Spectrum",
+      R"(Extreme eigenvalues of D^-1 A, D the block diagonal of A, by the Lanczos process
+[golub2013].)")
+      .def_ro("smallest", &Spectrum::smallest, "Smallest eigenvalue; it has no unit.")
+      .def_ro("largest", &Spectrum::largest, "Largest eigenvalue; it has no unit.")
       .def_ro("steps", &Spectrum::steps, "Lanczos steps taken.")
-      .def_ro("converged", &Spectrum::converged)
+      .def_ro("converged", &Spectrum::converged, "Whether both eigenvalues have settled.")
       .def(
           "__getstate__",
           [](const Spectrum& s) { return std::tuple(s.smallest, s.largest, s.steps, s.converged); })
@@ -371,21 +375,33 @@ void bind_system(nb::module_& m) {
              const auto& [smallest, largest, steps, converged] = state;
              new (&s) Spectrum{smallest, largest, steps, converged};
            })
-      .def_prop_ro("condition", &Spectrum::condition)
+      .def_prop_ro("condition", &Spectrum::condition, "Condition number: largest / smallest.")
       .def_prop_ro("radius", &Spectrum::radius, "Spectral radius of Jacobi's 1 - D^-1 A.");
+}
+
+void bind_system(nb::module_& m) {
   nb::class_<PyConstraintSystem>(
       m, "ConstraintSystem",
-      "The system A f = b of a model's joint constraint forces at one state [sharf1993].\n\n"
-      "A is symmetric positive definite and follows the joints: a block row per joint, as many "
-      "rows "
-      "as it constrains directions.")
+      R"(The system A f = b of a model's joint constraint forces at one state [sharf1993].
+
+A is symmetric positive definite and follows the joints: a block row per joint, with as many rows as
+the joint constrains directions. f holds forces [N] and moments [N m], b relative accelerations
+[m/s2, rad/s2]; both in the frames of the core, whose joint axes are z.)")
       .def(nb::init<const PyModel&, nb::handle, nb::handle, nb::handle, nb::handle, bool>(),
            "model"_a, "q"_a, "v"_a = nb::none(), "tau"_a = nb::none(), nb::kw_only(),
            "external"_a = nb::none(), "passive"_a = false,
-           "q (nq,), v (nv,), tau (nv,), external (n_joints, 6) as in forward_dynamics.")
-      .def_prop_ro("size", [](const PyConstraintSystem& s) { return s.A().size(); })
-      .def_prop_ro("b", &PyConstraintSystem::right_hand_side, nb::rv_policy::move,
-                   "Right-hand side (size,).")
+           "Assembles the system at a state.\n\n"
+           "Args:\n    model: the machine.\n"
+           "    q: positions (nq,) [rad, m]; v: rates (nv,) [rad/s, m/s]; tau: (nv,) [N m, N].\n"
+           "    external: wrenches (n_joints, 6) [N, N m] as in forward_dynamics.\n"
+           "    passive: adds the model's damping, friction, springs and stops to tau.\n\n"
+           "Raises:\n    InputError: shapes do not fit the model, or a number is not finite.")
+      .def_prop_ro(
+          "size", [](const PyConstraintSystem& s) { return s.A().size(); },
+          "Number of unknowns: constrained directions of all joints.")
+      .def_prop_ro(
+          "b", &PyConstraintSystem::right_hand_side, nb::rv_policy::move,
+          R"(Right-hand side (size,) [m/s2, rad/s2]: what the joints would open by without f.)")
       .def_prop_ro(
           "rows_per_joint",
           [](const PyConstraintSystem& s) {
@@ -393,85 +409,153 @@ void bind_system(nb::module_& m) {
             for (int n : s.A().dim) out.append(n);
             return out;
           },
-          "Constrained directions of each body's joint.")
-      .def("rows", &PyConstraintSystem::rows, "joint"_a, "Slice of f that belongs to a joint.")
-      .def("dense", &PyConstraintSystem::dense, "A as an array (size, size).")
-      .def("sparse", &PyConstraintSystem::sparse, "A as a scipy.sparse.csr_array.")
-      .def("multiply", &PyConstraintSystem::multiply, "f"_a, "A f.")
+          R"(Constrained directions of each body's inboard joint, in the order of the rows of A.)")
+      .def("rows", &PyConstraintSystem::rows, "joint"_a,
+           R"(Slice of f that belongs to a joint, given by its name; InputError for unknown
+joints.)")
+      .def("dense", &PyConstraintSystem::dense,
+           R"(A as an array (size, size) [1/kg, 1/(kg m), 1/(kg m2)].)")
+      .def("sparse", &PyConstraintSystem::sparse, R"(A as a scipy.sparse.csr_array (size, size).)")
+      .def("multiply", &PyConstraintSystem::multiply, "f"_a,
+           R"(A f (size,) [m/s2, rad/s2] of forces f (size,) [N, N m]; InputError for another
+shape.)")
       .def("energy_norm", &PyConstraintSystem::energy_norm, "f"_a,
-           "sqrt(f^T A f): for an error in f the kinetic-energy norm of the acceleration error.")
+           R"(sqrt(f^T A f) of f (size,) [N, N m]: for an error in f the kinetic-energy norm of the
+acceleration error. InputError for another shape.)")
       .def("solve", &PyConstraintSystem::solve, "solver"_a = "thomas", nb::kw_only(),
            "guess"_a = nb::none(), "tolerance"_a = 1e-12, "stop"_a = "energy_norm",
            "max_iterations"_a = 0, "solver_options"_a = nb::none(),
-           "(f, Report) by a solver of linkwise.solvers(); guess (size,) or None for zero. A solve "
-           "that fails says so\n"
-           "in the Report and returns what it has.")
+           R"(Solves A f = b.
+
+Args:
+    solver: a name of linkwise.solvers(), which cites its source.
+    guess: where iterations start (size,) [N, N m]; None: zero.
+    tolerance, stop: when they end; stop is a name of linkwise.stop_rules().
+    max_iterations: 0: the solver's own limit.
+    solver_options: further options by name, as in linkwise.solver_options().
+
+Returns:
+    f (size,) [N, N m] and a Report. A solve that fails says so there and returns what it has.
+
+Raises:
+    InputError: a name is unknown, an option unusable, or the guess has another shape.)")
       .def("recover", &PyConstraintSystem::recover, "f"_a,
-           "(acceleration (nv,), joint_load (n_joints, 6)) that constraint forces f lead to.")
+           R"(What constraint forces f (size,) [N, N m] lead to.
+
+Returns:
+    Accelerations (nv,) [rad/s2, m/s2], and joint loads (n_joints, 6) [N, N m] as of joint_loads.
+
+Raises:
+    InputError: f has another shape.)")
       .def("spectrum", &PyConstraintSystem::spectrum, nb::kw_only(), "max_steps"_a = 0,
-           "Estimate by the Lanczos process.")
+           R"(Extreme eigenvalues of D^-1 A: a Spectrum, by at most max_steps Lanczos steps; 0: as
+many as needed.)")
       .def(
           "condition_estimate",
           [](const PyConstraintSystem& s) { return s.spectrum(0).condition(); },
-          "Condition number of D^-1 A.")
+          R"(Condition number of D^-1 A, D the block diagonal of A; it has no unit.)")
       .def(
           "spectral_radius", [](const PyConstraintSystem& s) { return s.spectrum(0).radius(); },
-          "Spectral radius of Jacobi's iteration matrix 1 - D^-1 A.");
+          "Spectral radius of Jacobi's iteration matrix 1 - D^-1 A; it converges below 1.");
 }
 
-void bind_evaluator(nb::module_& m) {
-  nb::class_<PyEvaluator>(
-      m, "Evaluator",
-      "Forward dynamics with a memory: an iterative solver starts from the solutions of earlier "
-      "times, as in a simulation.")
-      .def(
-          "__init__",
-          [](PyEvaluator* self, const PyModel& model, const std::string& method,
-             const std::string& solver, const std::string& guess, double tolerance,
-             const std::string& stop, int max_iterations, nb::handle solver_options,
-             std::optional<int> threads) {
-            DynamicsOptions options;
-            options.executor = executor_for(threads);
-            options.method = method;
-            options.solver = solver;
-            options.initial_guess = guess;
-            options.solver_options.tolerance = tolerance;
-            options.solver_options.stop = stop_rule_from_name(stop);
-            options.solver_options.max_iterations = max_iterations;
-            read_solver_options(solver_options, options);
-            new (self) PyEvaluator(model, std::move(options));
-          },
-          "model"_a, nb::kw_only(), "method"_a = "auto", "solver"_a = "auto",
-          "initial_guess"_a = "cubic", "tolerance"_a = 1e-7, "stop"_a = "energy_norm",
-          "max_iterations"_a = 0, "solver_options"_a = nb::none(), "threads"_a = nb::none())
-      .def(
-          "evaluate", &PyEvaluator::evaluate, "t"_a, "q"_a, "v"_a = nb::none(),
-          "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(), "passive"_a = false,
-          "accept"_a = true,
-          "(acceleration (nv,), joint_load (n_joints, 6), Report) at time t. accept: later guesses "
-          "may build on it.")
-      .def("follow", &PyEvaluator::follow, "times"_a, "q"_a, "v"_a = nb::none(),
+void make_method(PyDynamicsMethod* self, const PyModel& model, const std::string& method,
+                 const std::string& solver, const std::string& guess, double tolerance,
+                 const std::string& stop, int max_iterations, nb::handle solver_options,
+                 std::optional<int> threads) {
+  DynamicsOptions options;
+  options.executor = executor_for(threads);
+  options.method = method;
+  options.solver = solver;
+  options.initial_guess = guess;
+  options.solver_options.tolerance = tolerance;
+  options.solver_options.stop = stop_rule_from_name(stop);
+  options.solver_options.max_iterations = max_iterations;
+  read_solver_options(solver_options, options);
+  new (self) PyDynamicsMethod(model, std::move(options));
+}
+
+void bind_dynamics_method(nb::module_& m) {
+  nb::class_<PyDynamicsMethod>(
+      m, "DynamicsMethod",
+      R"(A method of forward dynamics with its memory: an iterative solver starts from the
+solutions of earlier times, as in a simulation. linkwise.forward_dynamics remembers nothing.)")
+      .def("__init__", &make_method, "model"_a, nb::kw_only(), "method"_a = "auto",
+           "solver"_a = "auto", "initial_guess"_a = "cubic", "tolerance"_a = 1e-7,
+           "stop"_a = "energy_norm", "max_iterations"_a = 0, "solver_options"_a = nb::none(),
+           "threads"_a = nb::none(),
+           R"(Args:
+    model: the machine.
+    method, solver: names of linkwise.methods() and linkwise.solvers(); "auto" chooses.
+    initial_guess: a name of linkwise.initial_guesses().
+    tolerance, stop, max_iterations, solver_options: of iterative solvers, as in
+        ConstraintSystem.solve.
+    threads: how many share one evaluation; None: LINKWISE_THREADS or all cores.
+
+Raises:
+    InputError: a name is unknown or an option unusable.)")
+      .def("evaluate", &PyDynamicsMethod::evaluate, "t"_a, "q"_a, "v"_a = nb::none(),
+           "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(), "passive"_a = false,
+           "accept"_a = true,
+           R"(Forward dynamics at one time.
+
+Args:
+    t: the time [s], which guesses extrapolate to.
+    q: positions (nq,) [rad, m]; v: rates (nv,) [rad/s, m/s], None: at rest;
+        tau: joint torques and forces (nv,) [N m, N], None: zero.
+    external: wrenches (n_joints, 6) [N, N m] as in forward_dynamics.
+    passive: adds the model's damping, friction, springs and stops to tau.
+    accept: later guesses may build on this evaluation.
+
+Returns:
+    Accelerations (nv,) [rad/s2, m/s2], joint loads (n_joints, 6) [N, N m] as of joint_loads, and a
+    Report, which says so where the method failed.
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)")
+      .def("follow", &PyDynamicsMethod::follow, "times"_a, "q"_a, "v"_a = nb::none(),
            "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(), "passive"_a = false,
            "time_limit"_a = std::numeric_limits<double>::infinity(),
-           "One evaluation per state (n, ...), all accepted: a dictionary of acceleration (n, nv), "
-           "seconds, iterations,\n"
-           "error_estimate (n,) and outcome. Shorter when time_limit seconds have passed.")
-      .def_prop_ro("constraint_force", &PyEvaluator::constraint_force, nb::rv_policy::move,
-                   "Unknowns of the last evaluation (size of A,); empty without a solver.")
-      .def("reset", &PyEvaluator::reset, "Forget earlier times.")
-      .def_prop_ro("method", [](const PyEvaluator& s) { return s.choice().method; })
-      .def_prop_ro("solver", [](const PyEvaluator& s) { return s.choice().solver; });
+           R"(One evaluation per state, one after the other, all accepted.
+
+Args:
+    times: (n,) [s].
+    q: positions (n, nq) [rad, m]; v: rates (n, nv) [rad/s, m/s], None: at rest;
+        tau: joint torques and forces (n, nv) [N m, N], None: zero.
+    external: wrenches (n, n_joints, 6) [N, N m] as in forward_dynamics.
+    passive: adds the model's damping, friction, springs and stops to tau.
+    time_limit: stop after so many seconds of computing [s].
+
+Returns:
+    A dictionary of acceleration (n, nv) [rad/s2, m/s2], seconds, iterations, error_estimate (n,)
+    and outcome; shorter when time_limit has passed.
+
+Raises:
+    InputError: shapes do not fit the model or each other, or a number is not finite.)")
+      .def_prop_ro(
+          "constraint_force", &PyDynamicsMethod::constraint_force, nb::rv_policy::move,
+          R"(f (unknowns,) [N, N m] of the last evaluation; empty of a method without a solver.)")
+      .def("reset", &PyDynamicsMethod::reset, "Forget earlier times.")
+      .def_prop_ro(
+          "method", [](const PyDynamicsMethod& s) { return s.choice().method; },
+          "The method's name, also where \"auto\" was asked for.")
+      .def_prop_ro(
+          "solver", [](const PyDynamicsMethod& s) { return s.choice().solver; },
+          "The linear solver's name; empty where the method uses none.");
 }
 
 }  // namespace
 
 void bind_solve(nb::module_& m) {
+  bind_spectrum(m);
   bind_system(m);
-  bind_evaluator(m);
-  m.def("initial_guesses", &initial_guess_list, "The table of initial guesses, as dictionaries.");
-  m.def("stop_rules", &stop_rule_list, "The stop rules of iterative solvers, as dictionaries.");
+  bind_dynamics_method(m);
+  m.def("initial_guesses", &initial_guess_list,
+        R"(The table of initial guesses: dictionaries of name, description, reference.)");
+  m.def("stop_rules", &stop_rule_list,
+        R"(The stop rules of iterative solvers: dictionaries of name, description.)");
   m.def("solver_options", &solver_option_list,
-        "The keys of solver_options={...}, as dictionaries of name, default and description.");
+        R"(The keys of solver_options={...}: dictionaries of name, default, description.)");
 }
 
 }  // namespace linkwise::bindings

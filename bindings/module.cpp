@@ -13,8 +13,10 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
 
   m.attr("cpu_target") = LINKWISE_CPU_TARGET;
   m.attr("lanes") = LINKWISE_LANES;
-  nb::exception<linkwise::InputError>(m, "InputError", PyExc_ValueError).attr("__module__") =
-      "linkwise";
+  nb::exception<linkwise::InputError> input_error(m, "InputError", PyExc_ValueError);
+  input_error.attr("__module__") = "linkwise";
+  input_error.attr("__doc__") =
+      "What was given cannot be used: one line with the element and the remedy.";
   linkwise::bindings::bind_builder(m);
   linkwise::bindings::bind_model(m);
   linkwise::bindings::bind_dynamics(m);

@@ -4,7 +4,7 @@ from linkwise import drives as drives
 from linkwise import loads as loads
 from linkwise import scenes as scenes
 from linkwise._core import ConstraintSystem as ConstraintSystem
-from linkwise._core import Evaluator as Evaluator
+from linkwise._core import DynamicsMethod as DynamicsMethod
 from linkwise._core import ForwardDynamicsResult as ForwardDynamicsResult
 from linkwise._core import InputError as InputError
 from linkwise._core import Model as Model

@@ -202,7 +202,7 @@ def compare(
         "stop": stop,
         "max_iterations": max_iterations,
     }
-    reference = _core.Evaluator(model, method=REFERENCE, **options).follow(
+    reference = _core.DynamicsMethod(model, method=REFERENCE, **options).follow(
         trajectory.times, trajectory.q, trajectory.v, trajectory.tau, passive=True
     )
     expected = reference["acceleration"]
@@ -254,7 +254,7 @@ def _measure(
         "message": "",
     }
     try:
-        evaluator = _core.Evaluator(
+        dynamics = _core.DynamicsMethod(
             model,
             method=contestant.method,
             solver=contestant.solver or "auto",
@@ -262,14 +262,14 @@ def _measure(
             **options,
         )
         started = clock.monotonic()
-        found = _pass(evaluator, trajectory, time_limit)
+        found = _pass(dynamics, trajectory, time_limit)
         if found["seconds"].size < trajectory.times.size:  # or was it another program's fault?
-            found = max(found, _pass(evaluator, trajectory, time_limit), key=_states_reached)
+            found = max(found, _pass(dynamics, trajectory, time_limit), key=_states_reached)
     except InputError as error:
         return {**row, "outcome": "does not apply", "message": str(error)}
     seconds = found["seconds"]
     while clock.monotonic() - started < _TIMING_SECONDS:
-        again = _pass(evaluator, trajectory, time_limit)["seconds"]
+        again = _pass(dynamics, trajectory, time_limit)["seconds"]
         count = min(seconds.size, again.size)
         seconds = np.minimum(seconds[:count], again[:count])
     row["states"] = max(0, seconds.size - WARM_UP)
@@ -292,9 +292,9 @@ def _states_reached(found: Mapping[str, Any]) -> int:
     return int(found["seconds"].size)
 
 
-def _pass(evaluator: Any, trajectory: Trajectory, time_limit: float) -> dict[str, Any]:
-    evaluator.reset()
-    found: dict[str, Any] = evaluator.follow(
+def _pass(dynamics: Any, trajectory: Trajectory, time_limit: float) -> dict[str, Any]:
+    dynamics.reset()
+    found: dict[str, Any] = dynamics.follow(
         trajectory.times,
         trajectory.q,
         trajectory.v,

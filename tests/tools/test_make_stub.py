@@ -91,14 +91,14 @@ def test_tables_have_the_types_of_the_stub(name):
     assert fits(getattr(_core, name)(), eval(make_stub.RETURNS[name]))
 
 
-def test_systems_and_evaluators_return_what_the_stub_says():
+def test_systems_and_methods_return_what_the_stub_says():
     model = lw.scenes.chain(3)
     q = np.zeros(model.nq)
-    system, evaluator = lw.ConstraintSystem(model, q), lw.Evaluator(model)
+    system, method = lw.ConstraintSystem(model, q), lw.DynamicsMethod(model)
     for name, value in (
         ("ConstraintSystem.solve", system.solve()),
         ("ConstraintSystem.recover", system.recover(np.zeros(system.size))),
-        ("Evaluator.evaluate", evaluator.evaluate(0.0, q)),
-        ("Evaluator.follow", evaluator.follow([0.0, 1e-3], np.stack([q, q]))),
+        ("DynamicsMethod.evaluate", method.evaluate(0.0, q)),
+        ("DynamicsMethod.follow", method.follow([0.0, 1e-3], np.stack([q, q]))),
     ):
         assert fits(value, eval(make_stub.RETURNS[name], SPACE)), name

@@ -95,7 +95,7 @@ def measure(
     times = (np.arange(STEPS) + 1) * (DURATION / STEPS)
     q, v, a = maneuver.motion(times)
     tau = _core.inverse_dynamics(model, q, v, a)
-    evaluator = _core.Evaluator(
+    dynamics = _core.DynamicsMethod(
         model,
         method=method,
         solver=solver,
@@ -110,8 +110,8 @@ def measure(
     for done in range(max(2, math.ceil(solutions / STEPS))):
         if done >= 2 and clock.perf_counter() - started > _TIME_LIMIT:
             break
-        evaluator.reset()
-        found = evaluator.follow(times, q, v, tau)
+        dynamics.reset()
+        found = dynamics.follow(times, q, v, tau)
         seconds = np.minimum(seconds, found["seconds"])
     error = _core.kinetic_energy(model, q, found["acceleration"] - a)
     size = _core.kinetic_energy(model, q, a)

@@ -67,7 +67,7 @@ def _stop_test(maneuver: Maneuver, solver: str, guess: str, stop: str) -> dict[s
     times = (np.arange(_STEPS) + 0.5) * (DURATION / _STEPS)
     q, v, a = maneuver.motion(times)
     tau = _core.inverse_dynamics(model, q, v, a)
-    evaluator = _core.Evaluator(
+    dynamics = _core.DynamicsMethod(
         model,
         solver=solver,
         initial_guess=guess,
@@ -77,10 +77,10 @@ def _stop_test(maneuver: Maneuver, solver: str, guess: str, stop: str) -> dict[s
     )
     ratios, iterations, outcomes = [], [], set()
     for k, t in enumerate(times):
-        report = evaluator.evaluate(t, q[k], v[k], tau[k])[2]
+        report = dynamics.evaluate(t, q[k], v[k], tau[k])[2]
         system = _core.ConstraintSystem(model, q[k], v[k], tau[k])
         exact = system.solve("thomas")[0]
-        error = system.energy_norm(evaluator.constraint_force - exact) / system.energy_norm(exact)
+        error = system.energy_norm(dynamics.constraint_force - exact) / system.energy_norm(exact)
         ratios.append(error / tolerance)
         iterations.append(report.iterations)
         outcomes.add(report.outcome)

@@ -51,7 +51,7 @@ def _run(
 ) -> dict[str, Any]:
     from scipy.integrate import ode
 
-    evaluator = _core.Evaluator(
+    dynamics = _core.DynamicsMethod(
         model,
         solver=solver,
         initial_guess=PAPER_PROTOCOL.initial_guess,
@@ -64,7 +64,7 @@ def _run(
     def rates(t: float, y: Array) -> Array:
         q, v = np.split(y, 2)
         torque = _core.inverse_dynamics(model, *maneuver.motion(t))
-        acceleration, _, report = evaluator.evaluate(t, q, v, torque)
+        acceleration, _, report = dynamics.evaluate(t, q, v, torque)
         iterations.append(report.iterations)
         return np.concatenate((v, acceleration))
 

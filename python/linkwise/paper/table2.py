@@ -39,7 +39,7 @@ def contestants() -> Iterator[tuple[str, str, Protocol]]:
 def _takes_the_arm(method: str) -> bool:
     """Some methods are for certain mechanisms only."""
     try:
-        _core.Evaluator(scenes.srms_3l5d(), method=method)
+        _core.DynamicsMethod(scenes.srms_3l5d(), method=method)
     except _core.InputError:
         return False
     return True

@@ -63,21 +63,26 @@ struct DofPropertyEntry {
   const char* name;
   double fallback;
   bool infinite_ok, negative_ok;
+  const char* text;  ///< meaning and units, turning and sliding
 };
 inline constexpr double infinity = std::numeric_limits<double>::infinity();
 inline constexpr DofPropertyEntry dof_property_table[n_dof_properties] = {
-    {"damping", 0, false, false},
-    {"friction", 0, false, false},
-    {"friction_velocity", 0.01, false, false},
-    {"stiffness", 0, false, false},
-    {"rest_position", 0, false, true},
-    {"armature", 0, false, false},
-    {"lower", -infinity, true, true},
-    {"upper", infinity, true, true},
-    {"effort", infinity, true, false},
-    {"velocity", infinity, true, false},
-    {"limit_stiffness", 0, false, false},
-    {"limit_damping", 0, false, false},
+    {"damping", 0, false, false, "Viscous damping (nv,) [N m s/rad, N s/m]."},
+    {"friction", 0, false, false, "Level of Coulomb friction (nv,) [N m, N]."},
+    {"friction_velocity", 0.01, false, false,
+     "Rate (nv,) [rad/s, m/s] below which friction is smoothed: friction tanh(v / "
+     "friction_velocity)."},
+    {"stiffness", 0, false, false, "Spring to rest_position (nv,) [N m/rad, N/m]."},
+    {"rest_position", 0, false, true, "Where the spring is without force (nv,) [rad, m]."},
+    {"armature", 0, false, false, "Inertia of the rotor, seen at the joint (nv,) [kg m2, kg]."},
+    {"lower", -infinity, true, true, "Lower end of the range (nv,) [rad, m]."},
+    {"upper", infinity, true, true, "Upper end of the range (nv,) [rad, m]."},
+    {"effort", infinity, true, false, "Largest torque of the drive (nv,) [N m, N]; not enforced."},
+    {"velocity", infinity, true, false, "Largest rate (nv,) [rad/s, m/s]; not enforced."},
+    {"limit_stiffness", 0, false, false,
+     "Stiffness of the stops at both ends (nv,) [N m/rad, N/m]; 0: the range exerts no force."},
+    {"limit_damping", 0, false, false,
+     "Damping of the stops (nv,) [s/rad, s/m]: limit_stiffness depth (1 + limit_damping speed)."},
 };
 
 /// Throws InputError where the name is unknown.

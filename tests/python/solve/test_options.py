@@ -37,7 +37,7 @@ def arm():
 def test_wrong_options_are_refused_in_one_line(arm, options, parts):
     for call in (
         lambda: lw.forward_dynamics(arm, *STATE, solver="sor", solver_options=options),
-        lambda: lw.Evaluator(arm, solver="sor", solver_options=options),
+        lambda: lw.DynamicsMethod(arm, solver="sor", solver_options=options),
         lambda: lw.ConstraintSystem(arm, *STATE).solve("sor", solver_options=options),
     ):
         with pytest.raises(lw.InputError) as caught:
@@ -102,15 +102,15 @@ def motion(model, times):
 
 
 @pytest.mark.parametrize("guess", [g["name"] for g in lw.initial_guesses()])
-def test_an_evaluator_follows_a_motion_whatever_it_starts_from(arm, guess):
+def test_a_method_follows_a_motion_whatever_it_starts_from(arm, guess):
     times = np.linspace(0.1, 1.0, 40)
     q, v, tau, a = motion(arm, times)
-    evaluator = lw.Evaluator(arm, solver="gauss_seidel", initial_guess=guess, tolerance=1e-8)
-    found = evaluator.follow(times, q, v, tau)
+    dynamics = lw.DynamicsMethod(arm, solver="gauss_seidel", initial_guess=guess, tolerance=1e-8)
+    found = dynamics.follow(times, q, v, tau)
     assert set(found["outcome"]) == {"converged"}
     np.testing.assert_allclose(found["acceleration"], a, atol=1e-4)
     assert np.all(found["seconds"] > 0)
-    cold = lw.Evaluator(arm, solver="gauss_seidel", initial_guess="zero", tolerance=1e-8)
+    cold = lw.DynamicsMethod(arm, solver="gauss_seidel", initial_guess="zero", tolerance=1e-8)
     most = cold.follow(times, q, v, tau)["iterations"].sum()
     total = found["iterations"].sum()
     assert total == most if guess == "zero" else total < most
@@ -119,26 +119,28 @@ def test_an_evaluator_follows_a_motion_whatever_it_starts_from(arm, guess):
 def test_a_second_evaluation_at_one_time_starts_from_the_first(arm):
     times = np.array([0.3])
     q, v, tau, _ = motion(arm, times)
-    evaluator = lw.Evaluator(arm, solver="gauss_seidel", initial_guess="previous", tolerance=1e-7)
-    first = evaluator.evaluate(0.3, q[0], v[0], tau[0], accept=False)[2]
-    again = evaluator.evaluate(0.3, q[0], v[0], tau[0], accept=False)[2]
+    dynamics = lw.DynamicsMethod(
+        arm, solver="gauss_seidel", initial_guess="previous", tolerance=1e-7
+    )
+    first = dynamics.evaluate(0.3, q[0], v[0], tau[0], accept=False)[2]
+    again = dynamics.evaluate(0.3, q[0], v[0], tau[0], accept=False)[2]
     assert again.iterations <= 2 < first.iterations
-    assert evaluator.constraint_force.shape == (13,)
-    evaluator.reset()
-    assert evaluator.evaluate(0.3, q[0], v[0], tau[0])[2].iterations == first.iterations
+    assert dynamics.constraint_force.shape == (13,)
+    dynamics.reset()
+    assert dynamics.evaluate(0.3, q[0], v[0], tau[0])[2].iterations == first.iterations
 
 
-def test_an_evaluator_stops_at_its_time_limit():
+def test_a_method_stops_at_its_time_limit():
     model = lw.scenes.chain(200, axes="parallel")
     times = np.linspace(0.1, 1.0, 50)
     q, v, tau, _ = motion(model, times)
-    found = lw.Evaluator(model, solver="jacobi").follow(times, q, v, tau, time_limit=1e-9)
+    found = lw.DynamicsMethod(model, solver="jacobi").follow(times, q, v, tau, time_limit=1e-9)
     assert len(found["outcome"]) == len(found["acceleration"]) == 1
 
 
-def test_an_evaluator_wants_a_time_a_state(arm):
+def test_a_method_wants_a_time_a_state(arm):
     with pytest.raises(lw.InputError, match="2 states"):
-        lw.Evaluator(arm).follow([0.0], np.zeros((2, 5)))
+        lw.DynamicsMethod(arm).follow([0.0], np.zeros((2, 5)))
 
 
 def test_a_trace_holds_every_evaluation(arm):
