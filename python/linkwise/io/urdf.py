@@ -16,6 +16,7 @@ import numpy as np
 from lxml import etree
 
 from linkwise._core import InputError, Model, ModelBuilder
+from linkwise.base import Array
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.urdf_elements import UrdfElement
 from linkwise.io.urdf_vocabulary import ATTRIBUTES, Vocabulary
@@ -27,6 +28,8 @@ JointOrder = Literal["file", "pinocchio"]
 JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 _LIMITED = ("revolute", "prismatic")
 _LIMITS = ("lower", "upper", "effort", "velocity")
+#: A radius of gyration that many times the largest distance in the machine is a slip of units.
+_FAR = 5.0
 _WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
 _INERTIA = ATTRIBUTES["inertia"]
 #: The part that a complaint of the core is about, by its first word.
@@ -68,6 +71,7 @@ def read_urdf(
     joints = [reader.joint(element) for element in reader.joints]
     for joint in depth_first(joints) if joint_order == "pinocchio" else joints:
         builder.add_joint(joint.name, joint.type, joint.parent, joint.child, **joint.properties)
+    reader.note_units(joints)
     if floating_base:
         builder.set_floating_base()
     reader.note_what_is_left_out()
@@ -123,6 +127,7 @@ class _Reader:
         self.joints: list[UrdfElement] = []
         self._mimic = mimic
         self._mimics: dict[str, str] = {}
+        self._inertials: dict[str, tuple[float, Array, Array]] = {}
         self._found: dict[str, UrdfElement] = {}
         self._first: dict[str, UrdfElement] = {}  # of those whose name is used again
         self._vocabulary = Vocabulary(path, root)
@@ -161,7 +166,9 @@ class _Reader:
         xx, xy, xz, yy, yz, zz = (moments.number(a, f"inertia {a}") for a in _INERTIA)
         rotation = pose[:3, :3]
         inertia = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
-        builder.add_link(name, mass=mass, com=pose[:3, 3], inertia=0.5 * (inertia + inertia.T))
+        inertia = 0.5 * (inertia + inertia.T)
+        builder.add_link(name, mass=mass, com=pose[:3, 3], inertia=inertia)
+        self._inertials[name] = (mass, pose[:3, 3], inertia)
 
     def joint(self, element: UrdfElement) -> UrdfJoint:
         name, kind = str(element.get("name")), element.get("type")
@@ -262,6 +269,29 @@ class _Reader:
                 'let it move on its own with mimic="independent", or remove <mimic>',
             )
         self._mimics[name] = target
+
+    def note_units(self, joints: list[UrdfJoint]) -> None:
+        """Warn of inertias that no body of the link's size can have: units, or a default of 1."""
+        reach: dict[str, float] = {}
+        for joint in joints:
+            length = float(np.linalg.norm(joint.properties.get("translation", np.zeros(3))))
+            for link in (joint.parent, joint.child):
+                reach[link] = max(reach.get(link, 0.0), length)
+        largest = max(reach.values(), default=0.0)
+        for name, (mass, com, inertia) in self._inertials.items():
+            size = max(reach.get(name, 0.0), largest, float(np.linalg.norm(com)))
+            if mass <= 0 or size == 0:
+                continue
+            radius = math.sqrt(max(0.0, float(np.trace(inertia)) / 2 / mass))
+            if radius > _FAR * size:
+                guess = "1 kg m2 is what many exporters write by default"
+                if not np.allclose(inertia, np.eye(3)):
+                    guess = "inertias are kg m2 (1 kg mm2 = 1e-6 kg m2, 1 g mm2 = 1e-9 kg m2)"
+                self._note(
+                    name,
+                    f"radius of gyration {radius:.3g} m, far beyond a machine whose joints are at "
+                    f"most {size:.3g} m apart; check the units of mass and inertia: {guess}",
+                )
 
     def note_what_is_left_out(self) -> None:
         # A target that does not exist is no error: the coupling is not used either way.

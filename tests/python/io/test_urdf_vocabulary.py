@@ -174,3 +174,20 @@ def test_other_vocabularies_without_dynamics_are_counted(door):
         note.level for note in door().notes
     }
     assert any(note.element == "<capsule>" for note in model.notes)
+
+
+@pytest.mark.parametrize(
+    ("mass", "moments", "hint"),
+    [
+        ("0.85", ("313692", "320080", "465064"), "1 g mm2 = 1e-9"),  # g mm2
+        ("20", ("400000", "1100000", "1100000"), "1 kg mm2 = 1e-6"),  # kg mm2
+        ("0.01", ("1", "1", "1"), "by default"),
+        ("20", ("0.4", "1.1", "1.1"), None),
+    ],
+)
+def test_inertia_in_another_unit_is_hinted_at(door, mass, moments, hint):
+    new = '<mass value="{}"/><inertia ixx="{}" ixy="0" ixz="0" iyy="{}" iyz="0" izz="{}"/>'
+    old = DOOR[DOOR.index("<mass") : DOOR.index("    </inertial>")]
+    notes = [n for n in door(old, new.format(mass, *moments)).notes if "radius of" in n.text]
+    assert [n.element for n in notes] == (["leaf"] if hint else [])
+    assert hint is None or hint in notes[0].text

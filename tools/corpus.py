@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""Every URDF and MJCF of installed packages or of given folders, ours beside Pinocchio and MuJoCo.
+
+    python tools/corpus.py [FOLDER ...] [--json FILE]
+
+At a random state of each machine that loads, our mass matrix is compared with Pinocchio's (URDF,
+mimic joints independent) or MuJoCo's (MJCF). Prints how many load and agree, and each refusal with
+its reason. It belongs to no test: what is installed differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+import sysconfig
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import linkwise as lw
+from linkwise.io import mjcf_state
+
+AGREE = 1e-9
+MOST_FREEDOMS = 1500
+
+
+def found_in(folders: list[Path]) -> tuple[list[Path], list[Path]]:
+    """URDF files, and XML files whose root is <mujoco>."""
+    urdf = sorted({p for folder in folders for p in folder.rglob("*.urdf")})
+    mjcf = []
+    for path in sorted({p for folder in folders for p in folder.rglob("*.xml")}):
+        head = path.read_bytes()[:4096]
+        if re.search(rb"<mujoco\b(?!include)", head):
+            mjcf.append(path)
+    return urdf, mjcf
+
+
+def difference(ours: Any, theirs: Any) -> float:
+    return float(np.abs(ours - theirs).max() / max(float(np.abs(theirs).max()), 1e-300))
+
+
+def of_urdf(path: Path, rng: np.random.Generator) -> tuple[str, float | None, str]:
+    """How it went, how far the mass matrices are apart, and what was said."""
+    try:
+        model = lw.load(path, mimic="independent", joint_order="pinocchio")
+    except lw.InputError as error:
+        return "refused", None, str(error)
+    try:
+        import pinocchio as pin
+
+        theirs = pin.buildModelFromUrdf(str(path))
+    except Exception as error:
+        return "loads, no witness", None, f"Pinocchio: {error}"
+    if theirs.nv != model.nv or model.nv == 0 or model.nv > MOST_FREEDOMS:
+        return "loads, no witness", None, f"{model.nv} degrees of freedom, {theirs.nv} in Pinocchio"
+    q, qp = model.neutral_configuration(), pin.neutral(theirs)
+    for name in model.joint_names:
+        joint = theirs.joints[theirs.getJointId(name)]
+        angle = rng.uniform(-1, 1)
+        if joint.nv != 1:
+            continue  # at its zero
+        q[model.q_slice(name)] = angle
+        values = [angle] if joint.nq == 1 else [np.cos(angle), np.sin(angle)]
+        qp[joint.idx_q : joint.idx_q + joint.nq] = values
+    crba = pin.crba(theirs, theirs.createData(), qp)
+    symmetric = np.triu(crba) + np.triu(crba, 1).T
+    apart = difference(lw.mass_matrix(model, q), symmetric)
+    return ("agrees" if apart < AGREE else "differs"), apart, ""
+
+
+def of_mjcf(path: Path, rng: np.random.Generator) -> tuple[str, float | None, str]:
+    import mujoco
+
+    try:
+        model = lw.load(path)
+    except lw.InputError as error:
+        return "refused", None, str(error)
+    theirs = mjcf_state.compile_mjcf(path)
+    if model.nv == 0 or model.nv > MOST_FREEDOMS:
+        return "loads, no witness", None, f"{model.nv} degrees of freedom"
+    data = mujoco.MjData(theirs)
+    mujoco.mj_integratePos(theirs, data.qpos, rng.normal(size=theirs.nv) * 0.3, 1.0)
+    mujoco.mj_forward(theirs, data)
+    full = np.zeros((theirs.nv, theirs.nv))
+    mujoco.mj_fullM(theirs, data, full)
+    q = mjcf_state.position_from_mujoco(model, theirs, data.qpos)
+    ours = lw.mass_matrix(model, q)
+    # Each column of this matrix is our velocity for one unit of MuJoCo's.
+    turn = np.column_stack(
+        [
+            mjcf_state.velocity_from_mujoco(model, theirs, data.qpos, unit)
+            for unit in np.eye(theirs.nv)
+        ]
+    )
+    apart = difference(turn.T @ ours @ turn, full)
+    said = "; ".join(
+        f"{n.element}: {n.text}" for n in model.notes if "the mass matrix lacks it" in n.text
+    )
+    return ("agrees" if apart < AGREE else "differs"), apart, said
+
+
+def reason(text: str) -> str:
+    """A refusal without names and places, to count it by."""
+    return re.sub(r"'[^']*'", "'...'", re.sub(r"^\S*?(:\d+)?: ", "", text))[:160]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("folders", nargs="*", type=Path)
+    parser.add_argument("--json", type=Path)
+    given = parser.parse_args()
+    folders = given.folders or [Path(sysconfig.get_paths()["purelib"])]
+    rng = np.random.default_rng(0)
+    rows = []
+    for kind, paths, check in zip(
+        ("URDF", "MJCF"), found_in(folders), (of_urdf, of_mjcf), strict=True
+    ):
+        for path in paths:
+            try:
+                how, apart, said = check(path, rng)
+            except Exception as error:
+                how, apart, said = "fails", None, f"{type(error).__name__}: {error}"
+            rows.append((kind, str(path), how, apart, said))
+    counts = Counter((kind, how) for kind, _, how, _, _ in rows)
+    hows = ("agrees", "differs", "loads, no witness", "refused", "fails")
+    print("| files | found | agree | differ | load, without a witness | refused | fail |")
+    print("|---|---|---|---|---|---|---|")
+    for kind in ("URDF", "MJCF"):
+        numbers = [counts[kind, how] for how in hows]
+        print(f"| {kind} | {sum(numbers)} | " + " | ".join(map(str, numbers)) + " |")
+    print()
+    why = Counter((kind, reason(said)) for kind, _, how, _, said in rows if how == "refused")
+    for (kind, text), count in why.most_common():
+        print(f"{count} {kind} refused: {text}")
+    for kind, path, how, apart, said in rows:
+        if how in ("differs", "fails"):
+            print(f"{kind} {how} {'' if apart is None else f'{apart:.1e}'} {path} {said}")
+    if given.json:
+        given.json.write_text(json.dumps(rows, indent=1))
+    return 1 if any(how == "fails" for _, _, how, _, _ in rows) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
