@@ -16,7 +16,7 @@ from linkwise._core import InputError
 from linkwise.base import Array
 from linkwise.record.checksums import LIST, damage, reason
 from linkwise.record.labels import text_array
-from linkwise.record.machine import GROUP
+from linkwise.record.model import GROUP
 from linkwise.record.provenance import FORMAT_KEY
 from linkwise.record.schema import ORDER
 

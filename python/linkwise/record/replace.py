@@ -18,7 +18,7 @@ from pathlib import Path
 from linkwise._core import InputError
 from linkwise.record.checksums import GROUP, read_list
 from linkwise.record.claim import check_target, hold, is_run, release
-from linkwise.record.machine import GROUP as MACHINE
+from linkwise.record.model import GROUP as MACHINE
 from linkwise.record.schema import ORDER
 
 # The folders of a run that does not list its files.

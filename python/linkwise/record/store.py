@@ -21,7 +21,7 @@ from linkwise._core import InputError
 from linkwise.base import AnyArray
 from linkwise.record.checksums import GROUP
 from linkwise.record.claim import check_target, hold, is_run, release
-from linkwise.record.machine import write_model
+from linkwise.record.model import write_model
 from linkwise.record.provenance import plain
 from linkwise.record.read import open_dataset
 from linkwise.record.replace import beside, clear_leftovers, remove_run, take_place

@@ -11,7 +11,7 @@ from linkwise._core import InputError
 from linkwise.loads.peaks import peak_loads
 from linkwise.plot.run_figures import RunPlots
 from linkwise.record.export import write_csv, write_netcdf
-from linkwise.record.machine import read_model
+from linkwise.record.model import read_model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -16,7 +16,7 @@ from linkwise.io.complaint import near
 from linkwise.io.load import load
 from linkwise.io.urdf_visuals import Appearance, read_appearance
 from linkwise.loads.samples import held_model, model_of, rows
-from linkwise.record.machine import read_model
+from linkwise.record.model import read_model
 from linkwise.results import Run, open_run
 from linkwise.scenario import load_ratings, load_scenario, ratings_in
 from linkwise.view.shown_loads import CauseLoads

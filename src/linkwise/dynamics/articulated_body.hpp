@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "linkwise/exec/executor.hpp"
-#include "linkwise/kinematics/branches.hpp"
+#include "linkwise/recursion/branches.hpp"
 #include "linkwise/recursion/tree_sweeps.hpp"
 
 namespace linkwise {

@@ -1,6 +1,6 @@
 #pragma once
 // Articulated-body recursion for one tree with the SIMD lanes filled: its revolute paths
-// (kinematics/paths.hpp) run side by side in groups, the rest (a floating base, sliding fingers)
+// (recursion/paths.hpp) run side by side in groups, the rest (a floating base, sliding fingers)
 // body by body before and after them. Groups that need nothing of each other are shared by threads.
 // Paths, groups and the order of their sums depend on the model alone: any number of threads gives
 // the same bits.
@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "linkwise/exec/executor.hpp"
-#include "linkwise/kinematics/paths.hpp"
 #include "linkwise/recursion/path_group.hpp"
+#include "linkwise/recursion/paths.hpp"
 #include "linkwise/recursion/tree_sweeps.hpp"
 
 namespace linkwise {

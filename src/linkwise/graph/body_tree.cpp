@@ -23,7 +23,7 @@ Lumps make_lumps(const MachineGraph& graph, const SpanningForest& forest) {
       out.moving.push_back(j);
     }
   }
-  for (int j : forest.cuts)
+  for (int j : forest.loop_joints)
     for (int link : {graph.joints[j].parent, graph.joints[j].child}) ++out.outboard[out.lead[link]];
   out.light = out.massless;
   for (auto j = out.moving.rbegin(); j != out.moving.rend(); ++j)

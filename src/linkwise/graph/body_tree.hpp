@@ -17,7 +17,7 @@ struct Lumps {
   std::vector<int> moving;     ///< the forest's other joints, in its order
   std::vector<char> massless;  ///< by lead
   std::vector<char> light;     ///< by lead: massless, and so is all that hangs on it
-  std::vector<int> outboard;   ///< by lead: moving joints and ends of cut joints on it
+  std::vector<int> outboard;   ///< by lead: moving joints and ends of loop joints on it
 };
 
 Lumps make_lumps(const MachineGraph& graph, const SpanningForest& forest);

@@ -70,14 +70,14 @@ class Choice {
     depth_[link] = depth;
     for (int j = outboard_.first[link]; j >= 0; j = outboard_.next[j]) {
       const int child = graph_.joints[j].child;
-      if (depth_[child] >= 0) continue;  // leads back to where the tree has been: a cut
+      if (depth_[child] >= 0) continue;  // leads back to where the tree has been: a loop joint
       if (inboard[child] < 0) met_.push_back(child);
       if (inboard[child] < 0 || price(j) > price(inboard[child])) inboard[child] = j;
       if (--unmet_[child] == 0) ready_.push_back(child);
     }
   }
 
-  /// What is lost if a joint is cut, the most important first.
+  /// What is lost if a joint is left out, the most important first.
   std::tuple<bool, int, int, int> price(int j) const {
     const auto& joint = graph_.joints[j];
     return {joint.acts, -joint.freedom, -depth_[joint.parent], -j};
@@ -111,23 +111,24 @@ SpanningForest make_spanning_forest(const MachineGraph& graph) {
     open(graph.joints[j].child);
   }
   for (int j = 0; j < graph.n_joints(); ++j)
-    if (!hangs(j)) forest.cuts.push_back(j);
+    if (!hangs(j)) forest.loop_joints.push_back(j);
   return forest;
 }
 
-std::vector<int> loop_of(const MachineGraph& graph, const SpanningForest& forest, int cut) {
+std::vector<int> loop_of(const MachineGraph& graph, const SpanningForest& forest, int loop_joint) {
   const auto path = [&](int link) {  // joints from the link to its root
     std::vector<int> joints;
     for (int j; (j = forest.inboard[link]) >= 0; link = graph.joints[j].parent) joints.push_back(j);
     return joints;
   };
-  std::vector<int> down = path(graph.joints[cut].parent), up = path(graph.joints[cut].child);
+  std::vector<int> down = path(graph.joints[loop_joint].parent),
+                   up = path(graph.joints[loop_joint].child);
   while (!down.empty() && !up.empty() && down.back() == up.back()) {
     down.pop_back();
     up.pop_back();
   }
   std::reverse(down.begin(), down.end());
-  down.push_back(cut);
+  down.push_back(loop_joint);
   down.insert(down.end(), up.begin(), up.end());
   return down;
 }

@@ -3,10 +3,10 @@
 // as in Drake's multibody topology (LinkJointGraph and SpanningForest), but a joint is never turned
 // round: its coordinates and its load stay those of its child against its parent.
 //
-// A link that is the child of several joints hangs on one of them; the others are cut. The cut
-// goes, in this order of preference, to joints that do not act along their coordinates, joints with
-// more freedom (fewer loads to find), joints whose parent is further from the ground (short loops),
-// and joints that come later in the file.
+// A link that is the child of several joints hangs on one of them; the others are loop joints.
+// They are, in this order of preference, joints that do not act along their coordinates, joints
+// with more freedom (fewer loads to find), joints whose parent is further from the ground (short
+// loops), and joints that come later in the file.
 #include <vector>
 
 #include "linkwise/graph/machine_graph.hpp"
@@ -14,16 +14,16 @@
 namespace linkwise {
 
 struct SpanningForest {
-  std::vector<int> roots;    ///< the ground, then links that no joint path from it reaches
-  std::vector<int> inboard;  ///< by link: the joint that it hangs on, -1 for a root
-  std::vector<int> order;    ///< joints of the forest, parents first, as given otherwise
-  std::vector<int> cuts;     ///< the other joints, as given
+  std::vector<int> roots;        ///< the ground, then links that no joint path from it reaches
+  std::vector<int> inboard;      ///< by link: the joint that it hangs on, -1 for a root
+  std::vector<int> order;        ///< joints of the forest, parents first, as given otherwise
+  std::vector<int> loop_joints;  ///< the other joints, as given
 };
 
 SpanningForest make_spanning_forest(const MachineGraph& graph);
 
-/// The joints of the loop that a cut joint closes: from where the paths of its two links meet down
-/// to its parent, the cut joint itself, and back up from its child.
-std::vector<int> loop_of(const MachineGraph& graph, const SpanningForest& forest, int cut);
+/// The joints of the loop that a loop joint closes: from where the paths of its two links meet down
+/// to its parent, the loop joint itself, and back up from its child.
+std::vector<int> loop_of(const MachineGraph& graph, const SpanningForest& forest, int loop_joint);
 
 }  // namespace linkwise

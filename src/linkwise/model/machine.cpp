@@ -97,10 +97,10 @@ void add_floating_base(Machine& machine) {
 }
 
 [[noreturn]] void refuse_loop(const Machine& machine, const std::vector<int>& loop,
-                              const JointSpec& cut) {
-  const std::string head = "joint '" + cut.name + "'" + machine.where;
-  if (cut.parent == cut.child)
-    throw InputError(head + ": link '" + cut.child +
+                              const JointSpec& closing) {
+  const std::string head = "joint '" + closing.name + "'" + machine.where;
+  if (closing.parent == closing.child)
+    throw InputError(head + ": link '" + closing.child +
                      "' is its parent and its child; give it two links");
   const size_t shown = std::min<size_t>(loop.size(), 8);
   std::string names;
@@ -109,7 +109,7 @@ void add_floating_base(Machine& machine) {
     names += "'" + machine.joint(loop[i]).name + "'";
   }
   if (shown < loop.size()) names += " ...";
-  throw InputError(head + " closes a loop of joints " + names + " at link '" + cut.child +
+  throw InputError(head + " closes a loop of joints " + names + " at link '" + closing.child +
                    "'; a model is a tree: remove one of these joints");
 }
 
@@ -159,7 +159,7 @@ void require_tree(const Machine& machine, const SpanningForest& forest) {
   std::vector<int> root_of(graph.n_links());
   for (int root : forest.roots) root_of[root] = root;
   for (int j : forest.order) root_of[graph.joints[j].child] = root_of[graph.joints[j].parent];
-  for (int j : forest.cuts)
+  for (int j : forest.loop_joints)
     if (root_of[graph.joints[j].parent] == root_of[graph.joints[j].child])
       refuse_loop(machine, loop_of(graph, forest, j), machine.joint(j));
   if (forest.roots.size() == 1) return;

@@ -31,7 +31,8 @@ NameIndex index_links(const ModelSpec& spec, const std::string& where);
 /// Throws InputError where a joint's name is used twice or names a link that does not exist.
 Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::string& where);
 
-/// Throws InputError unless the forest is one tree without cuts: the recursion takes no loops yet.
+/// Throws InputError unless the forest is one tree without loop joints: the recursion takes no
+/// loops yet.
 void require_tree(const Machine& machine, const SpanningForest& forest);
 
 }  // namespace linkwise

@@ -138,7 +138,7 @@ class PathGroup {
         if (__builtin_expect(!(lane(D, l) > 0), 0)) failed = std::max(failed, index_[k].body[l]);
       store(s.axis.U, axis.U);
       s.axis.D_inverse = axis.D_inverse;
-      s.axis.u = axis.u;
+      s.axis.h = axis.h;
       PlanarInertia<S> Ya;
       reduce<RevoluteJoint>(Y, axis, RevoluteJoint::bias(s.velocity, 0.0, s.rate), Ya, p);
       if (with_loads) {

@@ -27,10 +27,10 @@ template <class S>
 struct EliminatedStack {
   Force<S> U[6];  ///< Y P
   S L[21];        ///< Cholesky factor of D
-  S u[6];         ///< tau - P^T p
+  S h[6];         ///< tau - P^T p
 };
 
-/// U, D and u, as of one axis. tau and armature are those of all joints. False where D is not
+/// U, D and h, as of one axis. tau and armature are those of all joints. False where D is not
 /// positive definite.
 template <class S>
 LW_INLINE bool eliminate(const GeneralState<S>& joint, const ArticulatedInertia<S>& Y,
@@ -41,7 +41,7 @@ LW_INLINE bool eliminate(const GeneralState<S>& joint, const ArticulatedInertia<
     for (int j = 0; j <= i; ++j) out.L[packed(i, j)] = dot(joint.P[i], out.U[j]);
     S& d = out.L[packed(i, i)];
     d = d + armature[joint.dof[i]];
-    out.u[i] = tau[joint.dof[i]] - dot(joint.P[i], p);
+    out.h[i] = tau[joint.dof[i]] - dot(joint.P[i], p);
   }
   return cholesky_factor(joint.n, out.L, smallest_pivot);
 }
@@ -50,12 +50,12 @@ LW_INLINE bool eliminate(const GeneralState<S>& joint, const ArticulatedInertia<
 template <class S>
 LW_INLINE void reduce(int n_columns, const EliminatedStack<S>& stack, const Motion<S>& c,
                       ArticulatedInertia<S>& Y, Force<S>& p) {
-  // W = U L^-T, so that U D^-1 U^T = W W^T and U D^-1 u = W (L^-1 u).
+  // W = U L^-T, so that U D^-1 U^T = W W^T and U D^-1 h = W (L^-1 h).
   Force<S> W[6];
   S z[6];
   for (int i = 0; i < n_columns; ++i) {
     Force<S> column = stack.U[i];
-    S y = stack.u[i];
+    S y = stack.h[i];
     for (int l = 0; l < i; ++l) {
       column -= Force<S>{stack.L[packed(i, l)] * W[l].lin, stack.L[packed(i, l)] * W[l].ang};
       y = y - stack.L[packed(i, l)] * z[l];
@@ -69,12 +69,12 @@ LW_INLINE void reduce(int n_columns, const EliminatedStack<S>& stack, const Moti
   for (int i = 0; i < n_columns; ++i) p += Force<S>{z[i] * W[i].lin, z[i] * W[i].ang};
 }
 
-/// u and pa, in the place of p, for another right-hand side.
+/// h and pa, in the place of p, for another right-hand side.
 template <class S>
 LW_INLINE void respond(const GeneralState<S>& joint, const ArticulatedInertia<S>& Ya,
                        const Motion<S>& c, const S* tau, EliminatedStack<S>& stack, Force<S>& p) {
   S y[6];
-  for (int i = 0; i < joint.n; ++i) y[i] = stack.u[i] = tau[joint.dof[i]] - dot(joint.P[i], p);
+  for (int i = 0; i < joint.n; ++i) y[i] = stack.h[i] = tau[joint.dof[i]] - dot(joint.P[i], p);
   cholesky_solve(joint.n, stack.L, y);
   p += Ya * c;
   for (int i = 0; i < joint.n; ++i) p += Force<S>{y[i] * stack.U[i].lin, y[i] * stack.U[i].ang};
@@ -106,7 +106,7 @@ LW_INLINE void accelerate(const GeneralState<S>& joint, const EliminatedStack<S>
                           const Motion<S>& c, Motion<S>& a, S* du) {
   a += c;
   S y[6];
-  for (int i = 0; i < joint.n; ++i) y[i] = stack.u[i] - dot(a, stack.U[i]);
+  for (int i = 0; i < joint.n; ++i) y[i] = stack.h[i] - dot(a, stack.U[i]);
   cholesky_solve(joint.n, stack.L, y);
   for (int i = 0; i < joint.n; ++i) du[joint.dof[i]] = y[i];
   add_rates(joint, du, a);

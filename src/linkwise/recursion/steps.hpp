@@ -1,7 +1,7 @@
 #pragma once
 // The articulated-body recursion, one body at a time [featherstone1983; featherstone2008, ch. 7]:
-//     Y_n = M_n + sum X_k^T Ya_k X_k,  U = Y P,  D = P^T U + armature,  u = tau - P^T p
-//     Ya = Y - U D^-1 U^T,  pa = p + Ya c + U D^-1 u;   du = D^-1 (u - U^T (X a_p + c))
+//     Y_n = M_n + sum X_k^T Ya_k X_k,  U = Y P,  D = P^T U + armature,  h = tau - P^T p
+//     Ya = Y - U D^-1 U^T,  pa = p + Ya c + U D^-1 h;   du = D^-1 (h - U^T (X a_p + c))
 // for joints of one axis; stack_steps.hpp has the others. This file says what is computed and
 // nothing about the order, which is the schedule's. The functions take and return plain values of
 // any scalar S and have no memory of their own, so every schedule and every kind of processor can
@@ -36,7 +36,7 @@ LW_INLINE void operator+=(Contribution<S>& a, const Contribution<S>& b) {
 template <class S>
 struct EliminatedAxis {
   Force<S> U;      ///< Y P
-  S D_inverse, u;  ///< 1 / (P^T Y P + armature), tau - P^T p
+  S D_inverse, h;  ///< 1 / (P^T Y P + armature), tau - P^T p
 };
 
 /// Ya: a joint without rotor leaves an inertia that is zero about z.
@@ -79,7 +79,7 @@ LW_INLINE Motion<S> outward_velocity(const Place& place, const Motion<S>& v_pare
   return v;
 }
 
-/// U, D and u of a joint whose outboard side takes Y a + p. Returns D, which must be positive.
+/// U, D and h of a joint whose outboard side takes Y a + p. Returns D, which must be positive.
 /// along: the pitch, or the column of a ColumnJoint.
 template <class J, class S, class Along, class Rotor>
 LW_INLINE S eliminate(const ArticulatedInertia<S>& Y, const Force<S>& p, const Along& along,
@@ -88,7 +88,7 @@ LW_INLINE S eliminate(const ArticulatedInertia<S>& Y, const Force<S>& p, const A
   S D = J::project(out.U, along);
   if constexpr (!std::is_same_v<Rotor, NoRotor>) D = D + rotor;
   out.D_inverse = 1.0 / D;
-  out.u = tau - J::project(p, along);
+  out.h = tau - J::project(p, along);
   return D;
 }
 
@@ -106,24 +106,24 @@ LW_INLINE void reduce(const ArticulatedInertia<S>& Y, const EliminatedAxis<S>& a
                       const Motion<S>& c, ReducedInertia<J, S>& Ya, Force<S>& p) {
   if constexpr (J::leaves_zero_row) {
     const Force<S> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};
-    eliminate_turn(Y, axis.U, V, c, axis.u, Ya, p);
+    eliminate_turn(Y, axis.U, V, c, axis.h, Ya, p);
   } else {
     Ya = Y;
     const Force<S> V = reduce_inertia(axis, Ya);
     p += Ya * c;
-    p += Force<S>{axis.u * V.lin, axis.u * V.ang};
+    p += Force<S>{axis.h * V.lin, axis.h * V.ang};
   }
 }
 
-/// u and pa, in the place of p, for another right-hand side at the same position. Y, U and D stand
+/// h and pa, in the place of p, for another right-hand side at the same position. Y, U and D stand
 /// for the factors L D L^T of the joint-space mass matrix [rodriguez1987].
 template <class J, bool moving, class S>
 LW_INLINE void respond(const ReducedInertia<J, S>& Ya, const Motion<S>& c, double pitch,
                        const S& tau, EliminatedAxis<S>& axis, Force<S>& p) {
-  const S u = tau - J::project(p, pitch);
-  axis.u = u;
+  const S h = tau - J::project(p, pitch);
+  axis.h = h;
   if constexpr (moving) p += Ya * c;
-  const S rate = axis.D_inverse * u;
+  const S rate = axis.D_inverse * h;
   p += Force<S>{rate * axis.U.lin, rate * axis.U.ang};
 }
 
@@ -138,8 +138,8 @@ LW_INLINE Force<S> outward_load(const Inertia& Ya, const Force<S>& pa, const Mot
 /// Leaves a joint's torque as it is.
 struct NoCut {
   template <class S>
-  LW_INLINE S less(const S& u) const {
-    return u;
+  LW_INLINE S less(const S& h) const {
+    return h;
   }
 };
 
@@ -149,7 +149,7 @@ template <class J, class S, class Cut = NoCut>
 LW_INLINE S accelerate(const EliminatedAxis<S>& axis, const Motion<S>& c, double pitch,
                        Motion<S>& a, const Cut& cut = {}) {
   a += c;
-  const S rate = axis.D_inverse * cut.less(S(axis.u - dot(a, axis.U)));
+  const S rate = axis.D_inverse * cut.less(S(axis.h - dot(a, axis.U)));
   J::add_rate(a, pitch, rate);
   return rate;
 }
@@ -174,7 +174,7 @@ LW_INLINE void carry_cut_forces(const Place& place, const EliminatedAxis<S>& axi
     const S r = cut.Psi[i].ang.z, scaled = r * axis.D_inverse;
     row[i] = r;
     for (int j = 0; j <= i; ++j) cut.Lambda[packed(i, j)] += scaled * cut.Psi[j].ang.z;
-    cut.beta[i] += scaled * axis.u;
+    cut.beta[i] += scaled * axis.h;
   }
   const Force<S> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};
 #pragma GCC unroll 5
@@ -192,9 +192,9 @@ LW_INLINE void carry_cut_forces(const Place& place, const EliminatedAxis<S>& axi
 template <class S>
 struct CutTorque {
   const S *row, *f;
-  LW_INLINE S less(S u) const {
-    for (int j = 0; j < cut_rows; ++j) u = u - row[j] * f[j];
-    return u;
+  LW_INLINE S less(S h) const {
+    for (int j = 0; j < cut_rows; ++j) h = h - row[j] * f[j];
+    return h;
   }
 };
 

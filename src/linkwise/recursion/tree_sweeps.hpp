@@ -135,7 +135,7 @@ class TreeSweeps {
         if (!eliminate_axis<J>(Y, b.sum.p, k, in.tau[at.v], axis)) fail(n);
         store(b.axis.U, axis.U);
         b.axis.D_inverse = axis.D_inverse;
-        b.axis.u = axis.u;
+        b.axis.h = axis.h;
         if (!with_loads && at.parent < 0) return;
         Force<S> p = b.sum.p;
         ReducedInertia<J, S> Ya;

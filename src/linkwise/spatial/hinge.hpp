@@ -89,10 +89,10 @@ LW_INLINE Force<S> to_parent(const HingePlacement<C>& k, S c, S s, Force<S> f) {
 }
 
 /// Eliminates a revolute joint without rotor, with U = Y P, V = U / D: Z = Y - V U^T and
-/// p + Z c + V u. c has no z components, and the moment about z that is left is the joint's torque.
+/// p + Z c + V h. c has no z components, and the moment about z that is left is the joint's torque.
 template <class S>
 LW_INLINE void eliminate_turn(const ArticulatedInertia<S>& Y, const Force<S>& U, const Force<S>& V,
-                              const Motion<S>& c, S u, PlanarInertia<S>& Z, Force<S>& p) {
+                              const Motion<S>& c, S h, PlanarInertia<S>& Z, Force<S>& p) {
   Z.A = Y.A;
   Z.A.m[0] -= V.lin.x * U.lin.x;
   Z.A.m[1] -= V.lin.y * U.lin.x;
@@ -110,12 +110,12 @@ LW_INLINE void eliminate_turn(const ArticulatedInertia<S>& Y, const Force<S>& U,
   Z.xy = Y.C.m[1] - V.ang.y * U.ang.x;
   Z.yy = Y.C.m[2] - V.ang.y * U.ang.y;
   const auto& A = Z.A.m;
-  p.lin.x += A[0] * c.lin.x + A[1] * c.lin.y + Z.B[0] * c.ang.x + Z.B[1] * c.ang.y + V.lin.x * u;
-  p.lin.y += A[1] * c.lin.x + A[2] * c.lin.y + Z.B[2] * c.ang.x + Z.B[3] * c.ang.y + V.lin.y * u;
-  p.lin.z += A[3] * c.lin.x + A[4] * c.lin.y + Z.B[4] * c.ang.x + Z.B[5] * c.ang.y + V.lin.z * u;
-  p.ang.x += Z.B[0] * c.lin.x + Z.B[2] * c.lin.y + Z.xx * c.ang.x + Z.xy * c.ang.y + V.ang.x * u;
-  p.ang.y += Z.B[1] * c.lin.x + Z.B[3] * c.lin.y + Z.xy * c.ang.x + Z.yy * c.ang.y + V.ang.y * u;
-  p.ang.z += u;
+  p.lin.x += A[0] * c.lin.x + A[1] * c.lin.y + Z.B[0] * c.ang.x + Z.B[1] * c.ang.y + V.lin.x * h;
+  p.lin.y += A[1] * c.lin.x + A[2] * c.lin.y + Z.B[2] * c.ang.x + Z.B[3] * c.ang.y + V.lin.y * h;
+  p.lin.z += A[3] * c.lin.x + A[4] * c.lin.y + Z.B[4] * c.ang.x + Z.B[5] * c.ang.y + V.lin.z * h;
+  p.ang.x += Z.B[0] * c.lin.x + Z.B[2] * c.lin.y + Z.xx * c.ang.x + Z.xy * c.ang.y + V.ang.x * h;
+  p.ang.y += Z.B[1] * c.lin.x + Z.B[3] * c.lin.y + Z.xy * c.ang.x + Z.yy * c.ang.y + V.ang.y * h;
+  p.ang.z += h;
 }
 
 /// X^T Y X.

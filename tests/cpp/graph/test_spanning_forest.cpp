@@ -1,4 +1,4 @@
-// Which joints become the tree, in which order, and which are cut.
+// Which joints become the tree, in which order, and which close loops.
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -21,7 +21,8 @@ MachineGraph graph_of(int n_links, std::vector<Joint> joints) {
   return graph;
 }
 
-/// Every joint is in the forest or cut, every link hangs on a joint of the forest or is a root.
+/// Every joint is in the forest or closes a loop, every link hangs on a joint of the forest or is a
+/// root.
 void check_forest(const MachineGraph& graph, const SpanningForest& forest) {
   std::vector<char> placed(graph.n_links(), 0);
   for (int root : forest.roots) {
@@ -36,8 +37,8 @@ void check_forest(const MachineGraph& graph, const SpanningForest& forest) {
     placed[joint.child] = 1;
   }
   EXPECT_EQ(std::count(placed.begin(), placed.end(), 1), graph.n_links());
-  EXPECT_EQ(forest.order.size() + forest.cuts.size(), graph.joints.size());
-  EXPECT_TRUE(std::is_sorted(forest.cuts.begin(), forest.cuts.end()));
+  EXPECT_EQ(forest.order.size() + forest.loop_joints.size(), graph.joints.size());
+  EXPECT_TRUE(std::is_sorted(forest.loop_joints.begin(), forest.loop_joints.end()));
 }
 
 TEST(SpanningForest, ATreeIsTakenAsItIsParentsFirst) {
@@ -46,7 +47,7 @@ TEST(SpanningForest, ATreeIsTakenAsItIsParentsFirst) {
   const SpanningForest forest = make_spanning_forest(graph);
   check_forest(graph, forest);
   EXPECT_EQ(forest.order, (Indices{1, 2, 0}));
-  EXPECT_EQ(forest.cuts, Indices{});
+  EXPECT_EQ(forest.loop_joints, Indices{});
   EXPECT_EQ(forest.roots, Indices{0});
 }
 
@@ -57,18 +58,18 @@ TEST(SpanningForest, AFourBarIsCutWhereItIsCheapest) {
   SpanningForest forest = make_spanning_forest(graph);
   check_forest(graph, forest);
   EXPECT_EQ(forest.order, (Indices{0, 1, 2}));
-  EXPECT_EQ(forest.cuts, Indices{3});  // all alike: the last one
+  EXPECT_EQ(forest.loop_joints, Indices{3});  // all alike: the last one
   EXPECT_EQ(loop_of(graph, forest, 3), (Indices{2, 3, 1, 0}));
 
   graph.joints[1].freedom = 3;  // fewer loads to find there
   forest = make_spanning_forest(graph);
   check_forest(graph, forest);
-  EXPECT_EQ(forest.cuts, Indices{1});
+  EXPECT_EQ(forest.loop_joints, Indices{1});
   EXPECT_EQ(loop_of(graph, forest, 1), (Indices{0, 1, 3, 2}));
 
   graph.joints[1].acts = true;  // but not when its coordinates are needed
   forest = make_spanning_forest(graph);
-  EXPECT_EQ(forest.cuts, Indices{3});
+  EXPECT_EQ(forest.loop_joints, Indices{3});
 }
 
 TEST(SpanningForest, ALoopIsCutFarFromTheGround) {
@@ -76,7 +77,7 @@ TEST(SpanningForest, ALoopIsCutFarFromTheGround) {
   const MachineGraph graph = graph_of(6, {{0, 1}, {1, 2}, {2, 5}, {0, 3}, {3, 5}, {5, 4}});
   const SpanningForest forest = make_spanning_forest(graph);
   check_forest(graph, forest);
-  EXPECT_EQ(forest.cuts, Indices{2});
+  EXPECT_EQ(forest.loop_joints, Indices{2});
   EXPECT_EQ(forest.order, (Indices{0, 1, 3, 4, 5}));
 }
 
@@ -86,7 +87,7 @@ TEST(SpanningForest, TwoLoopsThatShareAJointAreCutOnce) {
       graph_of(7, {{0, 1}, {1, 2}, {2, 3}, {3, 5}, {1, 4}, {4, 5}, {2, 6}, {0, 6}});
   const SpanningForest forest = make_spanning_forest(graph);
   check_forest(graph, forest);
-  EXPECT_EQ(forest.cuts, (Indices{3, 6}));
+  EXPECT_EQ(forest.loop_joints, (Indices{3, 6}));
   EXPECT_EQ(loop_of(graph, forest, 3), (Indices{1, 2, 3, 5, 4}));
   EXPECT_EQ(loop_of(graph, forest, 6), (Indices{0, 1, 6, 7}));
 }
@@ -96,7 +97,7 @@ TEST(SpanningForest, ALinkThatIsChildOfTwoJointsAtOnce) {
   const SpanningForest forest = make_spanning_forest(graph);
   check_forest(graph, forest);
   EXPECT_EQ(forest.order, Indices{1});
-  EXPECT_EQ(forest.cuts, (Indices{0, 2}));
+  EXPECT_EQ(forest.loop_joints, (Indices{0, 2}));
   EXPECT_EQ(loop_of(graph, forest, 0), (Indices{0, 1}));
 }
 
@@ -106,7 +107,7 @@ TEST(SpanningForest, ACycleOfDirectedJointsIsCutWhereItLeadsBack) {
   const SpanningForest forest = make_spanning_forest(graph);
   check_forest(graph, forest);
   EXPECT_EQ(forest.order, (Indices{1, 2, 3}));
-  EXPECT_EQ(forest.cuts, (Indices{0, 4}));
+  EXPECT_EQ(forest.loop_joints, (Indices{0, 4}));
   EXPECT_EQ(loop_of(graph, forest, 0), (Indices{2, 3, 0}));
   EXPECT_EQ(loop_of(graph, forest, 4), (Indices{1, 2, 3, 4}));
 }
@@ -117,7 +118,7 @@ TEST(SpanningForest, WhatTheGroundDoesNotReachGetsRootsOfItsOwn) {
   const SpanningForest forest = make_spanning_forest(graph);
   check_forest(graph, forest);
   EXPECT_EQ(forest.roots, (Indices{0, 1, 3, 5}));
-  EXPECT_EQ(forest.cuts, (Indices{2, 3}));
+  EXPECT_EQ(forest.loop_joints, (Indices{2, 3}));
   EXPECT_EQ(loop_of(graph, forest, 3), Indices{3});
 }
 
@@ -133,7 +134,7 @@ TEST(SpanningForest, RandomGraphsAreCoveredTheSameWayEveryTime) {
     check_forest(graph, forest);
     const SpanningForest again = make_spanning_forest(graph);
     EXPECT_EQ(forest.order, again.order);
-    EXPECT_EQ(forest.cuts, again.cuts);
+    EXPECT_EQ(forest.loop_joints, again.loop_joints);
   }
 }
 
@@ -161,7 +162,7 @@ TEST(BodyTree, AMasslessLinkWithTheEndOfALoopStaysABody) {
   MachineGraph graph = graph_of(4, {{0, 1, 1, true}, {1, 2, 1, true}, {0, 3, 1, true}, {1, 3}});
   graph.massless[1] = 1;
   const SpanningForest forest = make_spanning_forest(graph);
-  EXPECT_EQ(forest.cuts, Indices{3});
+  EXPECT_EQ(forest.loop_joints, Indices{3});
   const Lumps lumps = make_lumps(graph, forest);
   EXPECT_FALSE(is_stacked(lumps, 1));
   EXPECT_EQ(stack_massless(graph, forest, lumps).bodies.size(), 3u);

@@ -9,7 +9,7 @@ import pytest
 import linkwise as lw
 from linkwise import base
 from linkwise.io.urdf_visuals import read_appearance
-from linkwise.record.machine import GROUP, read_model
+from linkwise.record.model import GROUP, read_model
 from linkwise.view.source import Options, open_source, static_loads
 
 URDF = """<robot name="arm">

@@ -1,4 +1,4 @@
-#include "linkwise/kinematics/branches.hpp"
+#include "linkwise/recursion/branches.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "linkwise/kinematics/paths.hpp"
+#include "linkwise/recursion/paths.hpp"
 
 #include <algorithm>
 #include <utility>
