@@ -81,6 +81,7 @@ LATE_PACKAGES = {
     "scipy",
     "trimesh",
     "viser",
+    "websockets",
     "xarray",
     "zarr",
 }

@@ -188,11 +188,9 @@ def show(
     with running(host, port, source.title) as server:
         view = View(server, source, by_rating=by_rating)
         view.step(0.0)
-        shown_host = "127.0.0.1" if host in ("0.0.0.0", "::", "") else host
-        address = f"http://{shown_host}:{server.get_port()}"
-        started(address)
+        started(server.address)
         if open_browser:
-            webbrowser.open(address)
+            webbrowser.open(server.address)
         before = clock.monotonic()
         ended = stop or threading.Event()
         while True:

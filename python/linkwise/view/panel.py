@@ -126,7 +126,7 @@ class PlaybackControls:
                 requests.redraw = True
 
         def set_speed(event: Any) -> None:
-            playback.speed = SPEEDS[self._speed.value]
+            playback.speed = SPEEDS.get(self._speed.value, playback.speed)
 
         def set_loop(event: Any) -> None:
             playback.loop = self._loop.value
@@ -167,7 +167,7 @@ class JointChoice:
                 self.tell(f"there is no joint {self._input.value!r}")
 
         def click(event: Any) -> None:
-            if event.instance_index is not None:
+            if event.instance_index in range(len(names)):
                 self._input.value = names[event.instance_index]
                 requests.joint = names[event.instance_index]
 

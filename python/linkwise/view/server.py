@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from linkwise._core import InputError
+from linkwise.view.guard import Guard
 
 if TYPE_CHECKING:
     import viser
@@ -72,9 +73,13 @@ def replay(server: viser.ViserServer, arrays: list[memoryview]) -> list[dict[str
 
 @contextlib.contextmanager
 def running(host: str, port: int, title: str) -> Iterator[viser.ViserServer]:
-    """A server until the block ends, which no client can make reachable from outside."""
+    """A server until the block ends, which no client can make reachable from outside.
+
+    It answers who opens its `address`, and no other page (see `linkwise.view.guard`).
+    """
     viser = _viser()
     check_address(host, port)
+    guard = Guard(host, f"viser-v{viser.__version__}")
     os.environ.pop("_VISER_PORT_OVERRIDE", None)
 
     class Server(viser.ViserServer):  # type: ignore[misc, name-defined]
@@ -82,7 +87,15 @@ def running(host: str, port: int, title: str) -> Iterator[viser.ViserServer]:
             """Never: it would hand the scene to a relay on the network."""
             return None
 
-    with contextlib.redirect_stdout(io.StringIO()):  # it draws a box around its address
+        def disconnect_share_url(self) -> None:
+            """Nothing: there is none. (viser would say so on stdout, whenever a page asks.)"""
+
+        @property
+        def address(self) -> str:
+            """What to open in a browser, with the token without which nothing is answered."""
+            return guard.address(self.get_port())
+
+    with guard.on_servers(), contextlib.redirect_stdout(io.StringIO()):  # it draws a box
         server = Server(host=host, port=port, label=title, verbose=False)
     try:
         if port and server.get_port() != port:
