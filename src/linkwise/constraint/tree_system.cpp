@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "linkwise/exec/tiles.hpp"
+#include "linkwise/kinematics/user_frames.hpp"
 
 namespace linkwise {
 

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "linkwise/dynamics/refinement.hpp"
+#include "linkwise/kinematics/user_frames.hpp"
 #include "linkwise/recursion/constraint_stack_steps.hpp"
 
 namespace linkwise {

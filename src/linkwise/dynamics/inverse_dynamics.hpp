@@ -5,6 +5,7 @@
 // w_n is the joint load, so this is also the witness for the loads of every other method.
 #include <vector>
 
+#include "linkwise/kinematics/user_frames.hpp"
 #include "linkwise/recursion/stack_steps.hpp"
 
 namespace linkwise {

@@ -7,6 +7,8 @@
 // columns of P_n in the body's frame without ever forming dP/dt [featherstone2008, ch. 4].
 #include <utility>
 
+#include "linkwise/kinematics/sweep_input.hpp"
+#include "linkwise/kinematics/user_frames.hpp"
 #include "linkwise/model/model.hpp"
 
 namespace linkwise {
@@ -25,20 +27,6 @@ struct GeneralState {
   int n = 0;   ///< free degrees of freedom
   int dof[6];  ///< their indices in v
   Motion<S> P[6];
-};
-
-/// Inputs of a sweep, lanes interleaved: q[nq], v[nv], tau[nv] of scalars S.
-template <class S>
-struct SweepInput {
-  const S* q = nullptr;
-  const S* v = nullptr;
-  const S* tau = nullptr;
-  /// Wrench on each body at its joint frame, user axes, [n_joints][6]; null: none.
-  const S* external = nullptr;
-  /// Acceleration of prescribed degrees of freedom, [nv]; null: zero.
-  const S* prescribed = nullptr;
-  /// Times the model's gravity; 0 leaves it out.
-  double gravity_factor = 1;
 };
 
 /// Calls f(joint, begin, end) for every range of bodies with equal joints; joint is one of the
@@ -143,21 +131,6 @@ void calc_general_state(const Model& model, const BodyTopology& body, const Swee
   state.c = c;
 }
 
-/// Wrench of row `joint` of a user array, turned into its body's frame.
-template <class S>
-LW_INLINE Force<S> user_wrench(const S* external, const JointInfo& joint, int index) {
-  const S* w = external + 6 * index;
-  return transpose_times(joint.to_user, Force<S>{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
-}
-
-/// f(body, wrench) for all bodies, where there are external wrenches.
-template <class S, class F>
-LW_INLINE void for_external_wrenches(const Model& model, const SweepInput<S>& in, F&& f) {
-  for (int j = 0; in.external && j < model.n_joints(); ++j)
-    if (const JointInfo& joint = model.joints[j]; joint.last_of_body)
-      f(joint.body, user_wrench(in.external, joint, j));
-}
-
 /// Fills states (and general for bodies of that kind). in.v may be null: resting.
 template <class S>
 void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states,
@@ -201,33 +174,6 @@ LW_INLINE void copy_prescribed(const Model& model, const BodyTopology& body,
     if (!e.prescribed) continue;
     for (int k = 0; k < e.nv; ++k) du[e.v + k] = in.prescribed ? in.prescribed[e.v + k] : S{};
   }
-}
-
-/// Load of joint j in the user's joint frame, [6], from the wrench on its body in the body's own. A
-/// joint inside a stack carries the same wrench as the body, moved to its own point.
-template <class S>
-LW_INLINE void store_joint_load(const Model& model, int j, const S* q, Force<S> w, S* out) {
-  const JointInfo& joint = model.joints[j];
-  if (!joint.last_of_body) {
-    const BodyTopology& body = model.topology[joint.body];
-    for (int e = body.first_element + body.n_elements - 1;
-         e >= joint.first_element + joint.n_elements; --e)
-      w = transpose_times(element_pose(model.elements[e], q), w);
-  }
-  const Force<S> user = inverse_transpose_times(joint.to_user, w);
-  out[0] = user.lin.x;
-  out[1] = user.lin.y;
-  out[2] = user.lin.z;
-  out[3] = user.ang.x;
-  out[4] = user.ang.y;
-  out[5] = user.ang.z;
-}
-
-/// Joint loads [n_joints][6] from wrench(n), body n's in its own frame.
-template <class S, class W>
-void store_joint_loads(const Model& model, const S* q, W&& wrench, S* loads) {
-  for (int j = model.n_joints() - 1; j >= 0; --j)
-    store_joint_load<S>(model, j, q, wrench(model.joints[j].body), loads + 6 * j);
 }
 
 }  // namespace linkwise

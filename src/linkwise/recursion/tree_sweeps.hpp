@@ -9,6 +9,7 @@
 
 #include "linkwise/kinematics/body_state.hpp"
 #include "linkwise/kinematics/placement.hpp"
+#include "linkwise/kinematics/user_frames.hpp"
 #include "linkwise/recursion/stack_steps.hpp"
 #include "linkwise/recursion/steps.hpp"
 

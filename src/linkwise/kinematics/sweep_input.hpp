@@ -1,0 +1,20 @@
+#pragma once
+// What every sweep is given.
+
+namespace linkwise {
+
+/// Inputs of a sweep, lanes interleaved: q[nq], v[nv], tau[nv] of scalars S.
+template <class S>
+struct SweepInput {
+  const S* q = nullptr;
+  const S* v = nullptr;
+  const S* tau = nullptr;
+  /// Wrench on each body at its joint frame, user axes, [n_joints][6]; null: none.
+  const S* external = nullptr;
+  /// Acceleration of prescribed degrees of freedom, [nv]; null: zero.
+  const S* prescribed = nullptr;
+  /// Times the model's gravity; 0 leaves it out.
+  double gravity_factor = 1;
+};
+
+}  // namespace linkwise
