@@ -152,9 +152,9 @@ struct Evaluator::Workspace {
     return choice;
   }
   /// Does one state have a method of its own, not that of a batch?
-  bool is_cut() {
-    if (cut < 0) cut = linkwise::is_cut(model);
-    return cut > 0;
+  bool is_split() {
+    if (split < 0) split = linkwise::is_split(model);
+    return split > 0;
   }
   /// Made anew only where other options are asked for than at the last call.
   DynamicsMethod& kept_method(const DynamicsOptions& asked) {
@@ -171,7 +171,7 @@ struct Evaluator::Workspace {
   std::unique_ptr<DynamicsMethod> method;
   DynamicsOptions method_options;
   Choice choice;
-  int cut = -1;
+  int split = -1;
 };
 
 /// Borrows a workspace and gives it back at the end of its life.
@@ -213,7 +213,7 @@ Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const Dynami
   const bool is_auto = options.method == "auto";
   // This path builds no text: that would take as long as the dynamics of a small machine.
   if ((is_auto || options.method == "articulated_body") && options.solver == "auto") {
-    const bool alone = count == 1 && workspace.is_cut();
+    const bool alone = count == 1 && workspace.is_split();
     const Choice& by_default = workspace.default_choice();
     choice.method = alone && is_auto ? by_default.method : "articulated_body";
     if (alone && is_auto) choice.solver = by_default.solver;

@@ -2,7 +2,7 @@
 // Everything that is computed of given states: accelerations and joint loads, torques of a motion,
 // loads by cause. One place decides what computes them, by what was asked for and how many states
 // there are:
-//     one state     the method of the table that "auto" stands for: cut into pieces, paths or
+//     one state     the method of the table that "auto" stands for: split into pieces, paths or
 //                   branches where the machine is large enough, plain otherwise
 //     many states   articulated_body, or constraint_force with thomas, on SIMD lanes; every other
 //                   method state by state

@@ -178,7 +178,7 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
   return choice;
 }
 
-bool is_cut(const Model& model) {
+bool is_split(const Model& model) {
   return choose_dynamics(model, {}).method == "piecewise" || paths_fill(model, native_lanes) ||
          Branches(model).any();
 }

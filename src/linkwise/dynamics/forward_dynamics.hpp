@@ -59,8 +59,8 @@ struct Choice {
 };
 Choice choose_dynamics(const Model& model, const DynamicsOptions& options);
 
-/// Does "auto" cut one system of this model into pieces, paths or branches, for lanes or threads?
-bool is_cut(const Model& model);
+/// Does "auto" split one system of this model into pieces, paths or branches, for lanes or threads?
+bool is_split(const Model& model);
 
 /// Resolves "auto" and makes the method.
 std::unique_ptr<DynamicsMethod> make_dynamics(const Model& model, const DynamicsOptions& options);

@@ -1,5 +1,5 @@
 #pragma once
-// Many states cut into parts, over threads.
+// Many states split into parts, over threads.
 #include <algorithm>
 #include <functional>
 

@@ -1,6 +1,6 @@
 #pragma once
-// A long loop cut into tiles, the unit that threads share. Where the cuts are depends on the length
-// of the loop alone. So sums over tiles have the same bits for any number of threads.
+// A long loop split into tiles, the unit that threads share. Where a tile ends depends on the
+// length of the loop alone. So sums over tiles have the same bits for any number of threads.
 #include <algorithm>
 
 #include "linkwise/exec/executor.hpp"

@@ -1,8 +1,8 @@
 #pragma once
-// A tree cut at its branches, the natural pieces of a tree: subtrees small enough to be one
+// A tree split at its branches, the natural pieces of a tree: subtrees small enough to be one
 // worker's share, and the trunk that carries them. In an inward sweep the branches come first, in
-// an outward sweep the trunk does. Branches need nothing of each other [hwang1988]. Where the cuts
-// are depends on the model alone, never on the number of threads.
+// an outward sweep the trunk does. Branches need nothing of each other [hwang1988]. Where the
+// branches begin depends on the model alone, never on the number of threads.
 #include <vector>
 
 #include "linkwise/model/model.hpp"

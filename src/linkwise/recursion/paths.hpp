@@ -1,5 +1,5 @@
 #pragma once
-// A tree of revolute joints cut into paths, which run side by side in SIMD lanes. Every body
+// A tree of revolute joints split into paths, which run side by side in SIMD lanes. Every body
 // continues the path of the outboard body with the highest subtree. So the body at position k of a
 // path is k above its farthest tip, and a path is shorter than the one that it ends at. Taken
 // shortest first and aligned at their tips, paths find done what they need.
