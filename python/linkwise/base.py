@@ -32,6 +32,20 @@ def blocks(count: int, row_bytes: int) -> Iterator[slice]:
         yield slice(start, min(start + rows, count))
 
 
+def printable(text: object) -> str:
+    """`text` as a terminal may show it: on one line, what controls it written as an escape.
+
+    Names, paths and notes come from files and from runs of others. An escape sequence among them
+    would move the cursor, change the title or paint over what was said before.
+    """
+    shown = (c if c.isprintable() else " " if c.isspace() else _escape(c) for c in str(text))
+    return "".join(shown)
+
+
+def _escape(character: str) -> str:
+    return character.encode("unicode_escape").decode("ascii")
+
+
 def json_value(value: Any) -> Any:
     """`value` in types that JSON has; infinities and NaN, which it lacks, become null."""
     if hasattr(value, "tolist"):  # NumPy arrays and scalars

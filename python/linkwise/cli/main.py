@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import sys
 import warnings
@@ -118,7 +119,7 @@ def _warn(message: Warning | str, *_: object, **__: object) -> None:
 
 
 def _open_standard_streams() -> None:
-    """Streams that the caller closed (`linkwise ... >&-`) lead nowhere.
+    """Streams that the caller closed (`linkwise ... >&-`) lead nowhere; no text fails on others.
 
     Otherwise the next file that is opened would get their number, and messages would go into it.
     """
@@ -128,6 +129,10 @@ def _open_standard_streams() -> None:
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+    # Names that the encoding of the terminal lacks are shown with question marks.
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def main() -> NoReturn:

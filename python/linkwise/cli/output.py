@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,7 +26,7 @@ JsonOption = Annotated[
 
 def say(message: str) -> str:
     """One line on stderr, whatever the message holds; returns it."""
-    line = " ".join(message.split())
+    line = text(" ".join(message.split()))
     print(f"linkwise: {line}", file=sys.stderr)
     return line
 
@@ -38,18 +38,24 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 
 def console(*, stderr: bool = False) -> Console:
-    """A console for results (stdout) or progress (stderr).
+    """A console for results (stdout) or progress (stderr), which prints what users wrote escaped.
 
     Rich colours a terminal only, and not when NO_COLOR is set. Off a terminal lines are not folded:
     what reads them wants whole rows.
     """
     from rich.console import Console
+    from rich.segment import Segment
 
-    class PipeAwareConsole(Console):
+    class SafeConsole(Console):
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError  # `main` decides; Rich would exit with 1
 
-    made = PipeAwareConsole(stderr=stderr, highlight=False, soft_wrap=False, markup=False)
+        def render(self, *args: Any, **kwargs: Any) -> Iterator[Segment]:
+            for said, style, control in super().render(*args, **kwargs):
+                shown = said if control else "\n".join(map(text, said.split("\n")))
+                yield Segment(shown, style, control)
+
+    made = SafeConsole(stderr=stderr, highlight=False, soft_wrap=False, markup=False, emoji=False)
     if not made.is_terminal:
         made.width = 200
     return made
@@ -64,13 +70,15 @@ def table(title: str, columns: Sequence[tuple[str, str]]) -> Table:
     made = Table(title=title or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for heading, justify in columns:
         # As Text: in a string Rich would take "[s]" for a style.
-        made.add_column(Text(heading), justify=justify, overflow="fold")  # type: ignore[arg-type]
+        made.add_column(Text(text(heading)), justify=justify, overflow="fold")  # type: ignore[arg-type]
     return made
 
 
 def text(value: object) -> str:
-    """Names come from files: neither Rich markup nor control characters in them take effect."""
-    return "".join(c if c.isprintable() else "?" for c in str(value))
+    """What users wrote, with what controls a terminal escaped; see `linkwise.base.printable`."""
+    from linkwise.base import printable
+
+    return printable(value)
 
 
 def shown_path(path: object) -> str:

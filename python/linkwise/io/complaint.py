@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from typing import NoReturn
 
 from linkwise._core import InputError
+from linkwise.base import printable
 
 _SHOWN_NAMES = 8
 _SHOWN_CHARACTERS = 60
@@ -19,8 +20,7 @@ _SHOWN_CHARACTERS = 60
 
 def shorten(text: object, limit: int = _SHOWN_CHARACTERS) -> str:
     """``text`` on one line, printable, at most ``limit`` characters."""
-    line = "".join(c if c.isprintable() else " " for c in str(text)[: 4 * limit])
-    line = " ".join(line.split())
+    line = printable(" ".join(str(text)[: 4 * limit].split()))
     return line if len(line) <= limit else line[: limit - 3] + "..."
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from linkwise._core import InputError
+from linkwise.base import printable
 from linkwise.loads.peaks import peak_loads
 from linkwise.plot.run_figures import RunPlots
 from linkwise.record.export import write_csv, write_netcdf
@@ -78,7 +79,7 @@ class Run:
         return self.outcome == "converged"
 
     def __repr__(self) -> str:
-        return "\n".join(self._summary())
+        return "\n".join(map(printable, self._summary()))
 
     def _repr_html_(self) -> str:
         from html import escape
