@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
 COMMAND_LINE = "import sys; sys.argv[0] = 'linkwise'; from linkwise.cli import main; main()"
+PAGES = ("results", "input")
 LONGEST = 600  # seconds: a fuse; an example alone takes less than 10
 
 
@@ -107,3 +108,14 @@ def test_links_and_references_of_the_repository(checker):
     if not (ROOT / ".git").exists():
         pytest.skip("not a clone: the tools ask git for the files")
     assert checker.check(ROOT, tracked_files(ROOT)) == []
+
+
+def test_documents_name_what_the_tables_of_the_core_hold():
+    import linkwise as lw
+
+    texts = {name: " ".join((ROOT / f"docs/{name}.md").read_text().split()) for name in PAGES}
+    groups = " ".join(dict.fromkeys(row["group"] for row in lw.quantities()))
+    assert f"`{groups}`" in texts["results"]
+    assert f"`{groups}`" in texts["input"]
+    for row in lw.quantities():
+        assert f"`{row['name']}`" in texts["results"], row["name"]

@@ -14,17 +14,15 @@ import numpy as np
 from linkwise._core import InputError
 from linkwise.base import blocks
 from linkwise.io.writing import csv_cell, written_whole
+from linkwise.record.schema import TABLE
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _NETCDF_HEAD = 1 << 17  # of names and attributes
 
-# Scalars of one kind share a table.
-_TOGETHER = {
-    "energy": ("kinetic_energy", "potential_energy"),
-    "statistics": ("steps", "evaluations", "iterations", "step_size", "order"),
-}
+# Scalars of one group share a table.
+_GROUPS = {row["name"]: row["group"] for row in TABLE if row["axis"] == "none"}
 
 
 def _blocks(variables: list[xr.DataArray]) -> Iterator[slice]:
@@ -115,10 +113,9 @@ def write_csv(
     dataset: xr.Dataset, path: str | os.PathLike[str], quantity: str | None
 ) -> list[Path]:
     target = Path(os.path.abspath(path))
-    shared = {name: group for group, names in _TOGETHER.items() for name in names}
     tables: dict[str, list[str]] = {}
     for key in dataset.data_vars:
-        tables.setdefault(shared.get(str(key), str(key)), []).append(str(key))
+        tables.setdefault(_GROUPS.get(str(key), str(key)), []).append(str(key))
     if quantity is not None and quantity in dataset.data_vars:
         wanted = {quantity: [quantity]}
     elif quantity is not None:
