@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,6 +19,7 @@ from linkwise.cli.output import (
     print_json,
     say,
     shown_path,
+    text,
 )
 
 if TYPE_CHECKING:
@@ -51,6 +53,13 @@ def run(
     loaded = load_scenario(scenario)
     if output is None and loaded.settings.output.path is None:
         output = unused_path(f"{scenario.stem}.zarr")
+    standing = None if output is not None else loaded.replaces_elsewhere()
+    if standing is not None and not as_json and sys.stdin.isatty():
+        where = text(shown_path(standing))
+        if not typer.confirm(f"{where} lies outside the scenario's folder. Replace it?", err=True):
+            say("nothing was replaced; choose another place with --output")
+            raise typer.Exit(FAILED)
+        output = standing
     try:
         with live_progress(quiet=as_json) as progress:
             result = run_scenario(loaded, output=output, progress=progress)

@@ -79,6 +79,16 @@ class Table:
             raise InputError(
                 f"table interpolation: '{self.interpolation}' is unknown; use linear or cubic"
             )
+        spans = np.diff(times)
+        with np.errstate(over="ignore"):
+            slopes = np.diff(values, axis=0).T / spans
+            if self.interpolation == "cubic":
+                slopes = 12 * slopes / spans**2  # as large as any derivative of the spline
+        if not np.isfinite(slopes).all():
+            raise InputError(
+                "table values: change by more than a double holds; give smaller values or longer "
+                "times"
+            )
         for name, array in (("times", times), ("values", values.reshape(len(times), -1))):
             array.setflags(write=False)
             object.__setattr__(self, name, array)

@@ -35,7 +35,7 @@ from linkwise.scenario.schema import (
     WrenchSection,
 )
 
-_D = TypeVar("_D", bound=drives.Drive)
+_D = TypeVar("_D", bound=drives.Drive | drives.Table)
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+\Z")
 # Dimension of a quantity along an angle and along a length.
 _KINDS = {
@@ -315,7 +315,7 @@ class ArgumentBuilder:
             except ValueError as error:
                 problem, _, remedy = str(error).partition("; ")
                 complain(table.path, f"column '{shorten(column)}'", problem, remedy, 1)
-        return drives.Table(table.times, table.values[:, indices], interpolation)  # type: ignore[arg-type]
+        return self._make(keys, drives.Table, table.times, table.values[:, indices], interpolation)
 
     def _make(self, keys: Sequence[str], kind: type[_D], *values: Any) -> _D:
         """The drive; its complaints get the file and the key in front."""

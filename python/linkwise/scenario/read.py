@@ -83,8 +83,25 @@ class Scenario(ScenarioSource):
                 "joints": builder.joints(),
                 "scenario_text": self.text,
             },
-            "output": None if output.path is None else self.resolve(output.path),
+            "output": self._output_path(),
         }
+
+    def replaces_elsewhere(self) -> Path | None:
+        """What [output] path would replace outside the folder of this file, or None.
+
+        Scenarios come from other people. Where they write may not cost a file that they were never
+        shown.
+        """
+        path = self._output_path()
+        if path is None or not os.path.lexists(path):
+            return None
+        folder = os.path.realpath(self.resolve("."))
+        inside = os.path.realpath(path).startswith(os.path.join(folder, ""))
+        return None if inside else path
+
+    def _output_path(self) -> Path | None:
+        path = self.settings.output.path
+        return None if path is None else self.resolve(path)
 
     def _scene(self, kind: str, options: dict[str, Any]) -> Model:
         function: Callable[..., Model] = getattr(scenes, kind)
@@ -98,7 +115,7 @@ class Scenario(ScenarioSource):
             return function(**options)
         except InputError as error:
             raise InputError(f"{shorten(self.path, 400)}: model.{kind}: {error}") from None
-        except (TypeError, OverflowError) as error:
+        except (TypeError, ValueError, ArithmeticError) as error:
             self.complain(("model", kind), shorten(error, 120), "check the types of its values")
 
 
@@ -198,7 +215,7 @@ def _ratings(path: str | os.PathLike[str], data: bytes) -> dict[str, Rating]:
 
 def _read_toml(path: str | os.PathLike[str], data: bytes) -> tuple[str, dict[str, Any]]:
     try:
-        text = data.decode("utf-8")
+        text = data.decode("utf-8-sig")
         if _LONG_KEY.search(text):
             raise ValueError("a key has more than 16 parts")
         document = tomllib.loads(text)

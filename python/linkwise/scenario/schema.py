@@ -59,6 +59,7 @@ Scalar = Annotated[Quantity, PlainValidator(_quantity)]
 Vector = Annotated[Quantity | list[Quantity], PlainValidator(_quantities)]
 Number = Annotated[float, _of("number")]
 Time = Annotated[float, _of("time"), Field(gt=0)]
+Count = Annotated[int, Field(ge=1, lt=2**31)]
 Acceleration = Annotated[float, _of("acceleration")]
 
 
@@ -268,11 +269,11 @@ class SimulateSection(Section):
     initial_guess: str | None = None
     stop: str | None = None
     solver_tolerance: Annotated[Number, Field(gt=0)] | None = None
-    max_iterations: Annotated[int, Field(ge=1)] | None = None
+    max_iterations: Count | None = None
     step: Time | None = None
     max_step: Time | None = None
-    max_steps: Annotated[int, Field(ge=1, lt=2**31)] | None = None
-    threads: Annotated[int, Field(ge=1)] | None = None
+    max_steps: Count | None = None
+    threads: Count | None = None
 
 
 class OutputSection(Section):
@@ -361,6 +362,8 @@ def describe(error: dict[str, Any]) -> tuple[tuple[str, ...], str, str]:
         bound = context.get("gt", context.get("ge"))
         word = "above" if "gt" in context else "at least"
         return path, f"is {shown}", f"give a number {word} {bound:g}"
+    if kind == "less_than":
+        return path, f"is {shown}", f"give a number below {context['lt']}"
     if kind in ("too_short", "too_long"):
         return path, f"has {context['actual_length']} numbers", "give three"
     wanted = {

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from linkwise._core import InputError, ModelBuilder
+from linkwise._core import ModelBuilder
+from linkwise.scenes.chain import check_size
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -78,10 +79,8 @@ def _arm(
     payload_size: float,
     gravity: Sequence[float],
 ) -> Model:
-    if not (np.isfinite(payload_mass) and payload_mass >= 0):
-        raise InputError(f"payload_mass is {payload_mass!r}; give a mass >= 0 in kg")
-    if not (np.isfinite(payload_size) and payload_size > 0):
-        raise InputError(f"payload_size is {payload_size!r}; give an edge > 0 in m")
+    check_size("payload_mass", payload_mass, least=0.0)
+    check_size("payload_size", payload_size)
     builder = ModelBuilder(name, gravity=gravity)
     for i, s in enumerate(segments):
         builder.add_link(_link(s), mass=s.mass, inertia=np.diag(s.inertia))

@@ -23,10 +23,19 @@ def rod_inertia(mass: float, length: float, radius: float) -> np.ndarray:
     return np.diag([across, across, mass * radius**2 / 2])
 
 
+def check_rod(length: float, mass: float, radius: float) -> None:
+    """InputError unless these are a rod's."""
+    for name, value in (("length", length), ("mass", mass), ("radius", radius)):
+        check_size(name, value)
+
+
 def joint_axes(axes: str | ArrayLike, n: int, seed: int) -> np.ndarray:
     """Axes (k, 3), used in turn: a pattern by name, or the axes themselves."""
     if not isinstance(axes, str):
-        return np.atleast_2d(np.asarray(axes, dtype=float))
+        try:
+            return np.atleast_2d(np.asarray(axes, dtype=float))
+        except (TypeError, ValueError):
+            raise InputError("axes: are not numbers; give an array (k, 3)") from None
     if axes == "alternating":
         return np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
     if axes == "parallel":
@@ -46,10 +55,20 @@ def check_bodies(n: int) -> None:
     require_memory(float(BYTES_PER_BODY * n), f"a machine of {n} bodies")
 
 
-def check_count(name: str, n: int, least: int = 1) -> None:
-    """InputError unless ``n`` is a whole number of at least ``least``."""
-    if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < least:
-        raise InputError(f"{name} is {n!r}; give a whole number of at least {least}")
+def check_count(name: str, n: int) -> None:
+    """InputError unless ``n`` is a whole number of at least 1 that the core can count to."""
+    if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
+        raise InputError(f"{name} is {n!r}; give a whole number of at least 1")
+    if n >= 2**31:
+        raise InputError(f"{name} is {n!r}; give a whole number below 2^31")
+
+
+def check_size(name: str, value: float, *, least: float | None = None) -> None:
+    """InputError unless ``value`` is one finite number above 0, or of at least ``least``."""
+    real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not real or not np.isfinite(value) or (value <= 0 if least is None else value < least):
+        wanted = "above 0" if least is None else f"of at least {least:g}"
+        raise InputError(f"{name} is {value!r}; give a finite number {wanted}")
 
 
 def chain(
@@ -85,9 +104,7 @@ def chain(
         MemoryError: there is no room for so many bodies.
     """
     check_bodies(n_bodies)
-    for name, value in (("length", length), ("mass", mass), ("radius", radius)):
-        if not (np.isfinite(value) and value > 0):
-            raise InputError(f"{name} is {value!r}; give a positive number")
+    check_rod(length, mass, radius)
     return make_chain(
         n_bodies,
         joint=joint,

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import ModelBuilder
-from linkwise.scenes.chain import EARTH, check_bodies, check_count, joint_axes, rod_inertia
+from linkwise.scenes.chain import (
+    EARTH,
+    check_bodies,
+    check_count,
+    check_rod,
+    joint_axes,
+    rod_inertia,
+)
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -35,6 +42,7 @@ def tree(
     """
     check_bodies(n_bodies)
     check_count("branching", branching)
+    check_rod(length, mass, radius)
     directions = joint_axes(axes, n_bodies, seed)
     builder = ModelBuilder("tree", gravity=gravity)
     if floating_base:

@@ -67,6 +67,8 @@ def optional_count(name: str, value: Any) -> int | None:
         return None
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
         raise InputError(f"{name}: {value!r} given; give a whole number of at least 1")
+    if value >= 2**31:
+        raise InputError(f"{name}: {value!r} given; give a whole number below 2^31")
     return int(value)
 
 
@@ -97,6 +99,8 @@ def sample_times(
     if duration is None:
         raise InputError("duration: missing; give the seconds to simulate")
     end = number("duration", duration)
+    if end / _DEFAULT_SAMPLES < np.finfo(np.float64).tiny:
+        raise InputError(f"duration: {end:g} s is too short for a double; give a longer one")
     spacing = end / _DEFAULT_SAMPLES if every is None else number("every", every)
     count = end / spacing
     if count > _MAX_SAMPLES:

@@ -28,12 +28,20 @@ def run_scenario(
 
     `output` overrides the scenario's own `[output] path`; without either the run stays in memory.
     See `simulate` for the rest.
+
+    Raises InputError, too, where `[output] path` would replace what stands outside the scenario's
+    folder: only `output` does that.
     """
     loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     model = loaded.load_model()
     arguments = loaded.simulate_arguments(model)
     if output is not None:
         arguments["output"] = output
+    elif (standing := loaded.replaces_elsewhere()) is not None:
+        raise InputError(
+            f"{shorten(loaded.path, 400)}: output.path: '{shorten(standing, 400)}' exists outside "
+            "the scenario's folder; give output= (run: --output) to replace it, or another path"
+        )
     if arguments["output"] is not None:
         check_target(arguments["output"])
     try:
