@@ -12,6 +12,7 @@ import math
 import platform
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
@@ -29,13 +30,16 @@ _RECORDED_PACKAGES = ("linkwise", "numpy", "xarray", "zarr")
 
 
 def versions() -> dict[str, str]:
-    found = {"python": platform.python_version()}
-    for package in _RECORDED_PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
+    return {"python": platform.python_version()} | {p: _version(p) for p in _RECORDED_PACKAGES}
+
+
+@cache
+def _version(package: str) -> str:
+    """Read once: a file per package takes longer than a short simulation."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
 
 
 def plain(value: Any) -> str | int | float | bool:

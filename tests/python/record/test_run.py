@@ -3,6 +3,7 @@
 import csv
 import json
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -175,3 +176,12 @@ def test_csv_of_mixed_units_and_awkward_names(tmp_path):
     run.to_csv(tmp_path / "p.csv", "position")
     header, _ = read(tmp_path / "p.csv")
     assert header == ["time [s]", 'say "hi", you [m]', "turn [rad]"]
+
+
+def test_versions_are_read_once(monkeypatch):
+    module = sys.modules[provenance.__module__]
+    expected = module.versions()
+    monkeypatch.setattr(module, "version", None)  # would fail if it were called
+    assert module.versions() == expected
+    module.versions()["numpy"] = "changed"
+    assert module.versions() == expected
