@@ -37,7 +37,7 @@ nb::dict advance(PySimulation& self, nb::handle times_in, nb::handle quantities)
   return out;
 }
 
-nb::dict trace_columns(const std::vector<EvaluationTrace>& trace) {
+nb::dict trace_columns(const std::vector<EvaluationTrace::Row>& trace) {
   const Shape lead{trace.size()};
   NewArray time(lead), seconds(lead);
   nb::list iterations, accepted;
@@ -181,15 +181,22 @@ void bind_simulation(nb::module_& m) {
           "The joint where it failed, or empty.")
       .def_prop_ro("statistics", [](const PySimulation& s) { return s.simulation.statistics(); })
       .def(
-          "keep_trace", [](PySimulation& s, bool wanted) { s.simulation.keep_trace(wanted); },
+          "keep_trace",
+          [](PySimulation& s, bool wanted) {
+            s.simulation.set_observer(wanted ? &s.trace : nullptr);
+          },
           "wanted"_a = true,
           "From the next start on, record every evaluation that the integrator asks for.")
       .def(
-          "trace", [](const PySimulation& s) { return trace_columns(s.simulation.trace()); },
+          "trace", [](const PySimulation& s) { return trace_columns(s.trace.rows()); },
           "The evaluations so far, one array entry each: simulated time, seconds spent, "
           "iterations, and whether the step that it ended was accepted.")
       .def_prop_ro(
-          "velocity_drift", [](const PySimulation& s) { return s.simulation.velocity_drift(); },
+          "velocity_drift",
+          [](const PySimulation& s) {
+            const IntegratedState* state = s.simulation.integrated_state();
+            return state ? state->drift() : 0.0;
+          },
           "State body_velocities: how far joints come apart at the last sample, m/s or rad/s.")
       .def_prop_ro(
           "step_tolerance",

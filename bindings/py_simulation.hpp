@@ -1,6 +1,7 @@
 #pragma once
 // The compiled simulation as Python holds it, with its drives and wrenches.
 #include "arrays.hpp"
+#include "linkwise/simulate/evaluation_trace.hpp"
 #include "linkwise/simulate/simulation.hpp"
 #include "py_model.hpp"
 
@@ -12,6 +13,7 @@ class PySimulation {
       : model(owner.model), simulation(owner.model, std::move(options)) {}
 
   std::shared_ptr<const Model> model;
+  EvaluationTrace trace;
   Simulation simulation;
 
   void torque(const std::string& joint, nb::handle values);

@@ -50,6 +50,7 @@ LAYERS = {
     "recursion": MOTION | {"exec", "linear", "constraint"},
     "dynamics": NUMERICS | MECHANICS | {"recursion"},
     "integrate": BASE | {"exec"},
+    "paper": MOTION,
     "simulate": NUMERICS | MECHANICS | {"recursion", "dynamics", "integrate"},
 }
 

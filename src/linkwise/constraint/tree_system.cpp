@@ -135,58 +135,9 @@ void TreeSystem::assemble_node(int n, const SweepInput<double>& in) {
 }
 
 void TreeSystem::assemble(const SweepInput<double>& in) {
-  calc_body_states(*model_, in, state_.data(), general_.data());
-  calc_constraints();
-  assemble_rows(in);
-}
-
-double TreeSystem::calc_joint_rates(const double* q, std::span<const Motion<double>> v, double* u) {
-  SweepInput<double> resting;
-  resting.q = q;
-  calc_body_states(*model_, resting, state_.data(), general_.data());
-  calc_constraints();
-  std::fill(u, u + model_->nv(), 0.0);  // prescribed joints are locked
-  double drift = 0;
-  for (int n = 0; n < model_->n_bodies(); ++n) {
-    const int parent = model_->topology[n].parent;
-    const Motion<double> carried = parent >= 0 ? state_[n].X * v[parent] : Motion<double>{};
-    const Vector6<double> gap =
-        to_array(Motion<double>{v[n].lin - carried.lin, v[n].ang - carried.ang});
-    const auto component = [&](const Vector6<double>& direction) {
-      double sum = 0;
-      for (int i = 0; i < 6; ++i) sum += direction[i] * gap[i];
-      return sum;
-    };
-    const JointConstraint<double>& joint = joint_[n];
-    for (int i = 0; i < joint.free; ++i) u[joint.dof[i]] = component(joint.dual[i]);
-    for (int r = 0; r < joint.rows; ++r)
-      if (joint.armature_of[r] < 0) drift = std::max(drift, std::abs(component(joint.B[r])));
-  }
-  return drift;
-}
-
-void TreeSystem::assemble_at(const SweepInput<double>& in, std::span<const Motion<double>> v) {
-  const Model& model = *model_;
-  SweepInput<double> resting = in;
-  resting.v = nullptr;
-  calc_body_states(model, resting, state_.data(), general_.data());
-  for (int n = 0; n < model.n_bodies(); ++n) {
-    const BodyTopology& body = model.topology[n];
-    const Motion<double> v_parent = body.parent >= 0 ? v[body.parent] : Motion<double>{};
-    BodyState<double>& state = state_[n];
-    const Force<double> external = state.bias;  // all that a body at rest has
-    if (body.joint_kind == JointKind::general) {
-      calc_general_state(model, body, in, v_parent, state, general_[body.general]);
-    } else {
-      const Motion<double> P = element_column<double>(model.elements[body.first_element], 0);
-      const Motion<double> relative{in.v[body.v] * P.lin, in.v[body.v] * P.ang};
-      state.c = cross(state.X * v_parent, relative);
-    }
-    state.v = v[n];
-    state.bias = momentum_bias(model.constants[n].inertia, v[n]);
-    state.bias += external;
-  }
-  calc_constraints();
+  calc_states([&](BodyState<double>* state, GeneralState<double>* general) {
+    calc_body_states(*model_, in, state, general);
+  });
   assemble_rows(in);
 }
 

@@ -6,7 +6,6 @@
 //     A_ns = B_n^T X_n M_p^-1 X_s^T B_s
 //     b_n  = B_n^T (X_n afree_p + c_n - afree_n) + tau / armature
 // Siblings n, s are a hub of the block tree. Never solves. Bodies enter by their compliance alone.
-#include <span>
 #include <vector>
 
 #include "linkwise/constraint/joint_constraint.hpp"
@@ -26,12 +25,16 @@ class TreeSystem {
   const std::vector<BodyState<double>>& states() const { return state_; }
 
   void assemble(const SweepInput<double>& in);
-  /// As assemble(), from the bodies' own velocities v [n_bodies]: nothing passes from body to body.
-  /// in.v holds the joint rates that calc_joint_rates() finds.
-  void assemble_at(const SweepInput<double>& in, std::span<const Motion<double>> v);
-  /// u_n = P_n^+ (v_n - X_n v_p) [nv]; returns the largest component of v_n - X_n v_p in a
-  /// constrained direction.
-  double calc_joint_rates(const double* q, std::span<const Motion<double>> v, double* u);
+  /// The two halves of assemble(), for states that are found in another way: f(states, general)
+  /// writes them, and the joints' constraints follow; then the rows.
+  template <class F>
+  void calc_states(F&& f) {
+    f(state_.data(), general_.data());
+    calc_constraints();
+  }
+  void assemble_rows(const SweepInput<double>& in);
+  /// Of the states at hand.
+  const JointConstraint<double>& joint(int body) const { return joint_[body]; }
   /// du [nv] from the solution f; loads [n_joints][6] or null.
   void recover(const SweepInput<double>& in, const std::vector<double>& f, double* du,
                double* loads);
@@ -46,7 +49,6 @@ class TreeSystem {
  private:
   void calc_constraints();
   void calc_free_accelerations(const SweepInput<double>& in);
-  void assemble_rows(const SweepInput<double>& in);
   void assemble_node(int n, const SweepInput<double>& in);
 
   const Model* model_;

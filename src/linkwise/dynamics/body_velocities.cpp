@@ -35,9 +35,8 @@ BodyVelocities::BodyVelocities(const Model& model, const DynamicsOptions& option
                      " on floating, planar and spherical joints; use the state joint_rates");
 }
 
-std::span<const Motion<double>> BodyVelocities::unpack(const double* v) {
+void BodyVelocities::unpack(const double* v) {
   for (int n = 0; n < model_->n_bodies(); ++n) v_[n] = to_motion(v + 6 * n);
-  return v_;
 }
 
 void BodyVelocities::from_rates(const double* q, const double* u, double* v) {
@@ -53,17 +52,65 @@ void BodyVelocities::from_rates(const double* q, const double* u, double* v) {
   }
 }
 
-void BodyVelocities::to_rates(const double* q, const double* v, double* u) {
-  system_.calc_joint_rates(q, unpack(v), u);
+double BodyVelocities::to_rates(const double* q, const double* v, double* u) {
+  unpack(v);
+  SweepInput<double> resting;
+  resting.q = q;
+  system_.calc_states([&](BodyState<double>* state, GeneralState<double>* general) {
+    calc_body_states(*model_, resting, state, general);
+  });
+  std::fill(u, u + model_->nv(), 0.0);  // prescribed joints are locked
+  double drift = 0;
+  for (int n = 0; n < model_->n_bodies(); ++n) {
+    const int parent = model_->topology[n].parent;
+    const Motion<double> carried =
+        parent >= 0 ? system_.states()[n].X * v_[parent] : Motion<double>{};
+    const Vector6<double> gap =
+        to_array(Motion<double>{v_[n].lin - carried.lin, v_[n].ang - carried.ang});
+    const auto component = [&](const Vector6<double>& direction) {
+      double sum = 0;
+      for (int i = 0; i < 6; ++i) sum += direction[i] * gap[i];
+      return sum;
+    };
+    const JointConstraint<double>& joint = system_.joint(n);
+    for (int i = 0; i < joint.free; ++i) u[joint.dof[i]] = component(joint.dual[i]);
+    for (int r = 0; r < joint.rows; ++r)
+      if (joint.armature_of[r] < 0) drift = std::max(drift, std::abs(component(joint.B[r])));
+  }
+  return drift;
 }
 
-double BodyVelocities::drift(const double* q, const double* v) {
-  return system_.calc_joint_rates(q, unpack(v), du_.data());
+/// The bodies' states at the velocities v_: nothing passes from body to body.
+void BodyVelocities::calc_states(const SweepInput<double>& in, BodyState<double>* states,
+                                 GeneralState<double>* general) const {
+  SweepInput<double> resting = in;
+  resting.v = nullptr;
+  calc_body_states(*model_, resting, states, general);
+  for (int n = 0; n < model_->n_bodies(); ++n) {
+    const BodyTopology& body = model_->topology[n];
+    const Motion<double> v_parent = body.parent >= 0 ? v_[body.parent] : Motion<double>{};
+    BodyState<double>& state = states[n];
+    const Force<double> external = state.bias;  // all that a body at rest has
+    if (body.joint_kind == JointKind::general) {
+      calc_general_state(*model_, body, in, v_parent, state, general[body.general]);
+    } else {
+      const Motion<double> P = element_column<double>(model_->elements[body.first_element], 0);
+      const Motion<double> relative{in.v[body.v] * P.lin, in.v[body.v] * P.ang};
+      state.c = cross(state.X * v_parent, relative);
+    }
+    state.v = v_[n];
+    state.bias = momentum_bias(model_->constants[n].inertia, v_[n]);
+    state.bias += external;
+  }
 }
 
 DynamicsReport BodyVelocities::evaluate(double t, const SweepInput<double>& in, const double* v,
                                         double* dv) {
-  system_.assemble_at(in, unpack(v));
+  unpack(v);
+  system_.calc_states([&](BodyState<double>* state, GeneralState<double>* general) {
+    calc_states(in, state, general);
+  });
+  system_.assemble_rows(in);
   guess_->predict(t, system_.A(), system_.b(), f_);
   DynamicsReport report{solver_->solve(system_.A(), system_.b(), f_)};
   if (report.node >= 0) report.body = system_.body_of_node(report.node);

@@ -21,16 +21,17 @@ class BodyVelocities {
   int size() const { return 6 * model_->n_bodies(); }
   /// v [n_bodies][6] of joint rates u [nv].
   void from_rates(const double* q, const double* u, double* v);
-  /// u [nv] of v; the components in constrained directions are dropped.
-  void to_rates(const double* q, const double* v, double* u);
+  /// u [nv] of v. Returns the largest component of v_n - X_n v_p in a constrained direction, in m/s
+  /// or rad/s, which is dropped.
+  double to_rates(const double* q, const double* v, double* u);
   /// dv [n_bodies][6]; in.v holds the joint rates that to_rates() gave.
   DynamicsReport evaluate(double t, const SweepInput<double>& in, const double* v, double* dv);
   void accepted(double t) { guess_->accept(t, f_); }
-  /// Largest component of v_n - X_n v_p in a constrained direction, m/s or rad/s.
-  double drift(const double* q, const double* v);
 
  private:
-  std::span<const Motion<double>> unpack(const double* v);
+  void unpack(const double* v);
+  void calc_states(const SweepInput<double>& in, BodyState<double>* state,
+                   GeneralState<double>* general) const;
 
   const Model* model_;
   TreeSystem system_;

@@ -18,13 +18,11 @@ const std::vector<double>& BodyVelocityState::from_rates(const std::vector<doubl
   return y_;
 }
 
-double BodyVelocityState::interpolate(Integrator& integrator, double t,
-                                      std::vector<double>& state) {
+void BodyVelocityState::interpolate(Integrator& integrator, double t, std::vector<double>& state) {
   integrator.interpolate(t, y_);
   const double *q = y_.data(), *w = q + model_.nq();
   std::copy_n(q, model_.nq(), state.begin());
-  velocities_.to_rates(q, w, state.data() + model_.nq());
-  return velocities_.drift(q, w);
+  drift_ = velocities_.to_rates(q, w, state.data() + model_.nq());
 }
 
 Outcome BodyVelocityState::evaluate(double t, const double* y, double* ydot) {

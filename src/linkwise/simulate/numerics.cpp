@@ -71,7 +71,7 @@ SimulationOptions simulation_options(const Numerics& n, const Executor& executor
   o.dynamics.solver_options.tolerance = n.solver_tolerance.value_or(allowed_per_step / 10);
   o.dynamics.solver_options.max_iterations = n.max_iterations.value_or(0);
   o.follow_error_test = !n.solver_tolerance;
-  o.state = state_choice_from_name(n.state);
+  o.state = find_state(n.state);
   o.integrator = find_integrator(n.integrator).name;
   o.integration.tolerance = allowed_per_step;
   o.integration.step = n.step.value_or(0.0);

@@ -1,18 +1,10 @@
 #include "linkwise/simulate/setup.hpp"
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/dynamics/body_velocities.hpp"
 #include "linkwise/dynamics/evaluator.hpp"
 #include "linkwise/simulate/given_motion.hpp"
 
 namespace linkwise {
-
-StateChoice state_choice_from_name(std::string_view name) {
-  if (name == "joint_rates") return StateChoice::joint_rates;
-  if (name == "body_velocities") return StateChoice::body_velocities;
-  throw InputError("state '" + std::string(name) + "' is unknown; known: joint_rates, " +
-                   "body_velocities");
-}
 
 Setup::Setup(std::shared_ptr<const Model> model_, SimulationOptions options_)
     : model(std::move(model_)),
@@ -20,10 +12,10 @@ Setup::Setup(std::shared_ptr<const Model> model_, SimulationOptions options_)
       choice(choose_dynamics(*model, options.dynamics)),
       drives(model->n_joints()) {
   // Made once here so that bad options are refused before anything is written.
-  if (options.state == StateChoice::body_velocities) {
+  if (options.state) {
     if (options.dynamics.method == "auto") options.dynamics.method = "constraint_force";
     choice = choose_dynamics(*model, options.dynamics);
-    BodyVelocities(*model, options.dynamics);
+    options.state->make(*model, options.dynamics, {});
   }
   make_dynamics(*model, options.dynamics);
   check_integrator(options.integrator, options.integration);
@@ -53,9 +45,9 @@ void Setup::settle() {
   if (settled_) return;
   any_motion_ = false;
   for (const Drive& drive : drives) any_motion_ |= drive.kind == DriveKind::motion;
-  if (any_motion_ && options.state == StateChoice::body_velocities)
-    throw InputError(
-        "state body_velocities takes no motion drives; use the state joint_rates for them");
+  if (any_motion_ && options.state)
+    throw InputError("state " + std::string(options.state->name) +
+                     " takes no motion drives; use the state joint_rates for them");
   driven_ = driven_model(*model, drives);
   require_determined(driven());
   settled_ = true;
@@ -65,8 +57,8 @@ void check_members(const Setup& setup) {
   const SimulationOptions& options = setup.options;
   if (options.dynamics.method != "articulated_body")
     throw InputError("method '" + options.dynamics.method + "': a batch takes articulated_body");
-  if (options.state != StateChoice::joint_rates)
-    throw InputError("state body_velocities: a batch takes joint_rates");
+  if (options.state)
+    throw InputError("state " + std::string(options.state->name) + ": a batch takes joint_rates");
   if (!find_integrator(options.integrator).fixed_step)
     throw InputError("integrator '" + options.integrator +
                      "' chooses its own steps; a batch takes " + fixed_step_names());

@@ -1,27 +1,18 @@
 #pragma once
 // What all members of a simulation have in common: the machine, what drives it, and the numerics.
 #include <memory>
-#include <string_view>
 #include <vector>
 
 #include "linkwise/dynamics/forward_dynamics.hpp"
 #include "linkwise/forces/drive.hpp"
 #include "linkwise/integrate/integrator.hpp"
+#include "linkwise/simulate/integrated_state.hpp"
 
 namespace linkwise {
 
-/// What is integrated beside the joint coordinates.
-enum class StateChoice {
-  joint_rates,
-  body_velocities,  ///< the paper's: absolute velocities of the bodies [sharf1993]
-};
-
-/// InputError, listing the known names, when the name is unknown.
-StateChoice state_choice_from_name(std::string_view name);
-
 struct SimulationOptions {
   DynamicsOptions dynamics;
-  StateChoice state = StateChoice::joint_rates;
+  const StateEntry* state = nullptr;  ///< null: coordinates and joint rates
   /// The energy-norm rule of an iterative solver follows the integrator's error test, where it has
   /// one: see SolverTolerance. Otherwise its tolerance is that of the solver options.
   bool follow_error_test = false;

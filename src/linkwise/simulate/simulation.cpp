@@ -1,13 +1,11 @@
 #include "linkwise/simulate/simulation.hpp"
 
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/evaluator.hpp"
-#include "linkwise/simulate/body_velocity_state.hpp"
 #include "linkwise/simulate/given_motion.hpp"
 #include "linkwise/solve/registry.hpp"
 
@@ -45,24 +43,22 @@ void Simulation::start(double t0, const Start& start) {
   endings_.assign(members_, {Outcome::converged, t0, -1, ""});
   failure_ = {};
   iterations_ = 0;
-  drift_ = 0;
-  trace_.clear();
-  body_velocities_.reset();
+  if (observer_) observer_->started();
+  state_.reset();
   OdeSystem* system = this;
-  if (setup_->options.state == StateChoice::body_velocities) {
-    body_velocities_ = std::make_unique<BodyVelocityState>(
+  if (setup_->options.state) {
+    state_ = setup_->options.state->make(
         setup_->driven(), setup_->options.dynamics,
-        BodyVelocityState::Host{
-            [this](double t, const double* q, const double* u) { return input(t, q, u); },
-            [this](double t, const auto& evaluation, const double* dw, int n) {
-              return judge(t, keeps_trace_ ? traced(t, evaluation) : evaluation(), dw, n);
-            },
-            [this] { mark_accepted(); }});
-    system = body_velocities_.get();
+        {[this](double t, const double* q, const double* u) { return input(t, q, u); },
+         [this](double t, const auto& evaluation, const double* ydot, int n) {
+           return judge(t, observed(t, evaluation), ydot, n);
+         },
+         [this] { report_accepted(); }});
+    system = state_.get();
   }
   integrator_ = make_integrator(setup_->options.integrator, *system, setup_->options.integration);
   start_.assign(y_.begin(), y_.begin() + position_size());
-  if (body_velocities_) return integrator_->start(t0, body_velocities_->from_rates(y_));
+  if (state_) return integrator_->start(t0, state_->from_rates(y_));
   std::vector<double> y = y_;
   for (size_t i = 0; i < members_; ++i)
     parent_axes_.from_child(y.data() + i * nq(), rates_in(y.data()) + i * nv());
@@ -96,7 +92,7 @@ void Simulation::make_methods(double t0) {
 bool Simulation::follows_error_test() const {
   const SimulationOptions& options = setup_->options;
   const std::string& solver = setup_->choice.solver;
-  if (!options.follow_error_test || options.state != StateChoice::joint_rates) return false;
+  if (!options.follow_error_test || options.state) return false;
   if (solver.empty() || find_solver(solver).kind == SolverKind::direct) return false;
   if (options.dynamics.solver_options.stop != StopRule::energy_norm) return false;
   // With the guess zero, solutions must depend on time and state alone.
@@ -134,8 +130,9 @@ Outcome Simulation::accelerations(DynamicsMethod* method, double t, const double
   if (lanes_) return on_lanes(t, y, du, loads);
   const SweepInput<double> in = input(t, y, rates_in(y));
   const auto evaluation = [&] { return method->evaluate(t, in, du, loads); };
-  const bool recorded = keeps_trace_ && method == method_.get();
-  return judge(t, recorded ? traced(t, evaluation) : evaluation(), du, static_cast<int>(nv()));
+  const bool is_integration = method == method_.get();
+  return judge(t, is_integration && observer_ ? observer_->evaluate(t, evaluation) : evaluation(),
+               du, static_cast<int>(nv()));
 }
 
 /// Of all members; those whose evaluation fails end.
@@ -158,12 +155,8 @@ Outcome Simulation::on_lanes(double t, const double* y, double* du, double* load
   return any_running() ? Outcome::converged : endings_[0].outcome;
 }
 
-DynamicsReport Simulation::traced(double t, const std::function<DynamicsReport()>& evaluation) {
-  const auto started = std::chrono::steady_clock::now();
-  const DynamicsReport report = evaluation();
-  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started;
-  trace_.push_back({t, spent.count(), report.iterations, false});
-  return report;
+DynamicsReport Simulation::observed(double t, const std::function<DynamicsReport()>& evaluation) {
+  return observer_ ? observer_->evaluate(t, evaluation) : evaluation();
 }
 
 /// Of one member: an integrator that chooses its steps may recover, so nothing ends yet.
@@ -242,12 +235,8 @@ void Simulation::normalise(double* y) {
   for (size_t i = 0; i < members_; ++i) normalise_quaternions(model(), y + i * nq());
 }
 
-void Simulation::mark_accepted() {
-  if (!trace_.empty()) trace_.back().accepted = true;
-}
-
 void Simulation::accepted(double t, const double* y) {
-  mark_accepted();
+  report_accepted();
   if (solver_tolerance_) solver_tolerance_->accepted(t, y, rates_in(y));
   if (method_) method_->accepted(t);
 }
@@ -332,9 +321,9 @@ bool Simulation::reach(double t) {
 
 bool Simulation::advance(double t, const Sample& sample) {
   if (!reach(t)) return false;
-  if (body_velocities_)
-    drift_ = body_velocities_->interpolate(*integrator_, t, y_);
-  else {
+  if (state_) {
+    state_->interpolate(*integrator_, t, y_);
+  } else {
     integrator_->interpolate(t, y_);
     to_state(y_.data());
   }

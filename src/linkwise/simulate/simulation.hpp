@@ -15,12 +15,15 @@
 
 namespace linkwise {
 
-/// One evaluation of the equations of motion, where a trace is kept.
-struct EvaluationTrace {
-  double time = 0;     ///< simulated
-  double seconds = 0;  ///< spent on accelerations and joint loads, drives left out
-  int iterations = 0;
-  bool accepted = false;  ///< the last evaluation of an accepted step
+/// Looks on at the evaluations that the integrator asks for, of one member.
+class EvaluationObserver {
+ public:
+  virtual ~EvaluationObserver() = default;
+  virtual void started() = 0;
+  /// Makes the evaluation at time t and returns what it reports.
+  virtual DynamicsReport evaluate(double t, const std::function<DynamicsReport()>& evaluation) = 0;
+  /// The step that the last evaluation ended is accepted.
+  virtual void accepted() = 0;
 };
 
 /// Initial states with a row per member.
@@ -59,11 +62,10 @@ class Simulation : private OdeSystem {
   /// Asked at every step: once it is true, the run stops with the outcome `interrupted`.
   void set_interrupt(std::function<bool()> interrupted) { interrupted_ = std::move(interrupted); }
 
-  /// From the next start on, records every evaluation that the integrator asks for.
-  void keep_trace(bool wanted) { keeps_trace_ = wanted; }
-  const std::vector<EvaluationTrace>& trace() const { return trace_; }
-  /// State body_velocities: how far joints come apart, in m/s or rad/s, at the last sample; else 0.
-  double velocity_drift() const { return drift_; }
+  /// From the next start on; null: nobody. It must outlive the simulation's use.
+  void set_observer(EvaluationObserver* observer) { observer_ = observer; }
+  /// What is integrated in place of coordinates and joint rates; null: these.
+  const IntegratedState* integrated_state() const { return state_.get(); }
 
   const Model& model() const { return *setup_->model; }
   const Setup& setup() const { return *setup_; }
@@ -93,9 +95,11 @@ class Simulation : private OdeSystem {
   Outcome accelerations(DynamicsMethod* method, double t, const double* y, double* du,
                         double* loads);
   Outcome on_lanes(double t, const double* y, double* du, double* loads);
-  DynamicsReport traced(double t, const std::function<DynamicsReport()>& evaluation);
+  DynamicsReport observed(double t, const std::function<DynamicsReport()>& evaluation);
+  void report_accepted() {
+    if (observer_) observer_->accepted();
+  }
   Outcome judge(double t, const DynamicsReport& report, const double* du, int n);
-  void mark_accepted();
   Ending failure(size_t member, double t, Outcome outcome, int body, const double* du) const;
 
   void to_state(double* y) const;
@@ -119,16 +123,14 @@ class Simulation : private OdeSystem {
   std::unique_ptr<BatchEvaluator> lanes_;              ///< of several
   std::unique_ptr<BatchEvaluator> inverse_;            ///< made when first needed
   std::unique_ptr<Integrator> integrator_;
-  std::unique_ptr<BodyVelocityState> body_velocities_;
+  std::unique_ptr<IntegratedState> state_;
   /// Rows per member: state, that of an evaluation, given accelerations, samples.
   std::vector<double> y_, evaluated_, given_, du_, loads_, total_;
   std::vector<double> start_;  ///< positions there
   std::vector<Ending> endings_;
   Ending failure_;  ///< of the last evaluation of one member that failed in the present step
-  double drift_ = 0;
   long iterations_ = 0;
-  bool keeps_trace_ = false;
-  std::vector<EvaluationTrace> trace_;
+  EvaluationObserver* observer_ = nullptr;
   std::function<bool()> interrupted_;
 };
 

@@ -85,16 +85,16 @@ inline std::vector<std::string_view> all_kinds() {
 /// Every method with the joint rates as state, and the bodies' own velocities as state.
 struct Formulation {
   std::string method;
-  StateChoice state;
+  const StateEntry* state = nullptr;
 };
 inline std::vector<Formulation> formulations(const Model& model) {
-  std::vector<Formulation> all{{"constraint_force", StateChoice::body_velocities}};
+  std::vector<Formulation> all{{"constraint_force", find_state("body_velocities")}};
   for (const DynamicsEntry& entry : dynamics_table())
-    if (takes(entry, model)) all.push_back({std::string(entry.name), StateChoice::joint_rates});
+    if (takes(entry, model)) all.push_back({std::string(entry.name)});
   return all;
 }
 inline void PrintTo(const Formulation& f, std::ostream* out) {
-  *out << f.method << (f.state == StateChoice::body_velocities ? ", body velocities" : "");
+  *out << f.method << (f.state ? ", body velocities" : "");
 }
 inline SimulationOptions with(SimulationOptions options, const Formulation& f) {
   options.dynamics.method = f.method;

@@ -15,7 +15,7 @@ using enum JointType;
 
 /// The one method of batches.
 SimulationOptions steps_of(double step, std::string_view kind = "runge_kutta_4") {
-  return with(fixed_step(step, kind), {"articulated_body", StateChoice::joint_rates});
+  return with(fixed_step(step, kind), {"articulated_body"});
 }
 
 constexpr auto go_on = [] { return true; };
@@ -283,9 +283,8 @@ TEST(BatchSimulation, RefusesWhatItCannotTake) {
   // The method and the state, at the one door as well.
   const auto tree = make_model(every_kind());
   const Members two(*tree, 2, 1);
-  for (const Formulation& f : {Formulation{"auto", StateChoice::joint_rates},
-                               Formulation{"constraint_force", StateChoice::joint_rates},
-                               Formulation{"constraint_force", StateChoice::body_velocities}}) {
+  for (const Formulation& f : {Formulation{"auto"}, Formulation{"constraint_force"},
+                               Formulation{"constraint_force", find_state("body_velocities")}}) {
     Simulation other(tree, with(fixed_step(1e-3), f));
     EXPECT_NO_THROW(other.start(0, {two.q.data(), two.v.data()}));
     EXPECT_THROW(other.start(0, two.start()), InputError);

@@ -82,8 +82,7 @@ TEST(Lifecycle, BatchesOfSimulations) {
   Sample sample;
   sample["joint_load"] = loads.data();
   for (int i = 0; i < cycles; ++i) {
-    const Simulation simulation(
-        model, with(fixed_step(1e-3), {"articulated_body", StateChoice::joint_rates}));
+    const Simulation simulation(model, with(fixed_step(1e-3), {"articulated_body"}));
     const Simulation* const all[] = {&simulation};
     const auto ends = simulate_batch(all, {q.data(), v.data(), nullptr, 3}, times, sample,
                                      Executor(2), [] { return true; });
