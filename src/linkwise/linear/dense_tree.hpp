@@ -1,7 +1,7 @@
 #pragma once
 // A symmetric positive semidefinite matrix of dense blocks of any size along a forest, and its
-// block L D L^T, leaf to root. For small systems made of larger ones: the coarse matrix of pieces,
-// the Schur complement of a border.
+// block L D L^T, leaf to root. For small systems made of larger ones, as the coarse matrix of
+// pieces.
 
 #include <span>
 #include <vector>

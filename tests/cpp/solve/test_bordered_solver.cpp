@@ -8,8 +8,8 @@
 
 #include "linear/block_tree_scenes.hpp"
 #include "linear/dense_twin.hpp"
-#include "linkwise/solve/bordered_solver.hpp"
 #include "linkwise/solve/registry.hpp"
+#include "solve/bordered_solver.hpp"
 
 namespace linkwise::testing {
 namespace {

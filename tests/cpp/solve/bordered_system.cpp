@@ -1,4 +1,4 @@
-#include "linkwise/linear/bordered_system.hpp"
+#include "solve/bordered_system.hpp"
 
 namespace linkwise {
 

@@ -1,4 +1,4 @@
-#include "linkwise/solve/bordered_solver.hpp"
+#include "solve/bordered_solver.hpp"
 
 #include <algorithm>
 #include <cmath>

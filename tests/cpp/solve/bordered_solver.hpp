@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "linkwise/linear/bordered_system.hpp"
 #include "linkwise/linear/dense_tree.hpp"
 #include "linkwise/solve/solver.hpp"
+#include "solve/bordered_system.hpp"
 
 namespace linkwise {
 
