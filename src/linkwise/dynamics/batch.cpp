@@ -7,6 +7,7 @@
 #include "linkwise/dynamics/constraint_elimination.hpp"
 #include "linkwise/dynamics/inverse_dynamics.hpp"
 #include "linkwise/forces/armature_bias.hpp"
+#include "linkwise/simd/rows.hpp"
 
 namespace linkwise {
 
@@ -141,8 +142,7 @@ struct BatchEvaluator::Work {
   }
   void unpack(const Group* from, size_t n, size_t i, size_t count, double* to, size_t stride) {
     const int lanes = static_cast<int>(std::min<size_t>(native_lanes, count - i));
-    for (int l = 0; l < lanes; ++l)
-      for (size_t k = 0; k < n; ++k) to[(i + l) * stride + k] = from[k][l];
+    lanes_to_rows(from, n, lanes, to + i * stride, stride);
   }
 
   /// Torques [nv] that belong to causes: to none, to velocities (of armatures), to passive forces.
