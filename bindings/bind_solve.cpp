@@ -12,6 +12,7 @@
 #include "bind.hpp"
 #include "interrupt.hpp"
 #include "linkwise/constraint/tree_system.hpp"
+#include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/forces/passive.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "linkwise/solve/spectrum.hpp"
@@ -84,6 +85,7 @@ class PyConstraintSystem {
     keep(q_, in.q, model_->nq());
     keep(v_, in.v, model_->nv());
     keep(tau_, in.tau, model_->nv());
+    add_armature_bias(*model_, v_.data(), -1, tau_.data());
     if (in.external) keep(external_, in.external, 6 * model_->n_joints());
     system_.assemble(input());
   }

@@ -141,6 +141,10 @@ def test_every_method_and_inverse_dynamics_agree_on_turning_armatures(count, rng
             continue
         found = lw.forward_dynamics(model, q, v, tau, method=method["name"], tolerance=1e-14)
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    system = lw.ConstraintSystem(model, q[0], v[0], tau[0])
+    np.testing.assert_allclose(
+        system.recover(system.solve()[0])[0], expected[0], rtol=1e-9, atol=1e-9
+    )
     causes = ["gravity", "velocity", "drive"]
     for method in ("articulated_body", "constraint_force"):
         shares = lw.joint_loads_by_cause(model, causes, q, v, tau, method=method)
