@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import os
@@ -10,6 +11,7 @@ from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +22,10 @@ from linkwise.io.numbers import parse_number
 from linkwise.io.units import Unit, parse_unit
 
 _TIME_NAMES = ("time", "t")
+# A name and its unit where blanks separate names.
+_BLANKS = re.compile(r"[^\s\[\]]+(?:\s*\[[^\[\]]*\])?")
+_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+\Z")
+_MOST_PREAMBLE = 1000
 _HEADER = re.compile(r"(.*?)\s*\[([^\[\]]*)\]\Z", re.DOTALL)
 
 
@@ -63,8 +69,9 @@ def read_table(path: str | os.PathLike[str]) -> CsvTable:
 
     The first line that is neither empty nor a comment (``#``) is the header. One column is called
     ``time`` or ``t``; the others are free. A name may carry a unit, as in ``elbow [deg]`` or
-    ``time [ms]``; values are converted to SI. Commas separate, or semicolons if the header has no
-    comma.
+    ``time [ms]``; values are converted to SI. Commas separate; if the header has none semicolons,
+    tabs or blanks do, and numbers may have decimal commas. What OpenSim writes above a header
+    (.sto, .mot) is skipped. UTF-8, or UTF-16 with its mark.
 
     Raises InputError naming file, line and column for gaps (empty cells, short or empty lines),
     NaN, infinity, text, time that stands still or runs backwards, fewer than two rows.
@@ -107,7 +114,8 @@ def read_table(path: str | os.PathLike[str]) -> CsvTable:
 
 def _decode(path: str | os.PathLike[str], data: bytes) -> str:
     try:
-        text = data.decode("utf-8-sig")
+        wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        text = data.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         complain(path, "table", "is not UTF-8 text", "save it as CSV with UTF-8 encoding", line)
@@ -118,28 +126,81 @@ def _decode(path: str | os.PathLike[str], data: bytes) -> str:
 
 def _rows(path: str | os.PathLike[str], text: str) -> Iterator[tuple[int, list[str]]]:
     """Line number and cells of each row; empty lines may stand before the header and at the end."""
-    written = (s.strip() for s in io.StringIO(text, newline=None))
-    first = next((s for s in written if s and not s.startswith("#")), "")
-    delimiter = "," if "," in first or ";" not in first else ";"
+    skipped = _preamble(path, text)
+    written = (s.strip() for s in islice(io.StringIO(text, newline=None), skipped, None))
+    delimiter = _delimiter(next((s for s in written if s and not s.startswith("#")), ""))
     empty: int | None = None
-    started = False
+    started = commas = points = decimals = False
     for line, raw in enumerate(io.StringIO(text, newline=None), 1):
         content = raw.strip()
-        if content.startswith("#"):
+        if line <= skipped or content.startswith("#"):
             continue
         if not content:
             empty = empty or (line if started else None)
             continue
         if empty:
             complain(path, "table", "an empty line is a gap", "delete it or fill the row in", empty)
+        if started and delimiter != ",":
+            commas, points = commas or "," in content, points or "." in content
+            if commas and points:
+                problem = "numbers have commas and points; which are decimals is not clear"
+                complain(path, "table", problem, "write decimals with points, as 1234.5", line)
+            decimals = decimals or _has_decimal_comma(content.split(delimiter))
+            content = content.replace(",", ".")
+        if '"' in content:
+            cells = _quoted(path, line, content, delimiter)
+        elif delimiter == " ":
+            cells = content.split() if started else _BLANKS.findall(content)
+        else:
+            cells = content.split(delimiter)
         started = True
-        if '"' not in content:
-            yield line, content.split(delimiter)
-            continue
-        try:
-            yield line, next(csv.reader([content], delimiter=delimiter, strict=True))
-        except csv.Error as error:
-            complain(path, "table", f"is not CSV ({error})", "check quotes and separators", line)
+        yield line, cells
+    if commas and not decimals:
+        problem = "commas may separate thousands or decimals"
+        complain(path, "table", problem, "write decimals with points, and no thousands apart", line)
+
+
+def _has_decimal_comma(cells: Sequence[str]) -> bool:
+    """Whether a comma among these stands where it cannot separate thousands."""
+    return any("," in cell and not _THOUSANDS.match(cell.strip(' "')) for cell in cells)
+
+
+def _quoted(path: str | os.PathLike[str], line: int, content: str, delimiter: str) -> list[str]:
+    """The cells of a line with quotes; several blanks separate as one does."""
+    try:
+        rows = csv.reader(
+            [content], delimiter=delimiter, skipinitialspace=delimiter == " ", strict=True
+        )
+        return next(rows)
+    except csv.Error as error:
+        complain(path, "table", f"is not CSV ({error})", "check quotes and separators", line)
+
+
+def _delimiter(header: str) -> str:
+    """What separates the names in a header: commas, else semicolons, tabs or blanks."""
+    return next((mark for mark in (",", ";", "\t") if mark in header), _blank_or_comma(header))
+
+
+def _blank_or_comma(header: str) -> str:
+    return " " if '"' in header or len(_BLANKS.findall(header)) > 1 else ","
+
+
+def _preamble(path: str | os.PathLike[str], text: str) -> int:
+    """How many lines go before the header in files of OpenSim (.sto, .mot); 0 in others."""
+    lines = [s.strip() for s in islice(io.StringIO(text, newline=None), _MOST_PREAMBLE)]
+    if "endheader" not in lines:
+        return 0
+    count = lines.index("endheader") + 1
+    for number, line in enumerate(lines[:count], 1):
+        if line.replace(" ", "").lower() == "indegrees=yes":
+            complain(
+                path,
+                "inDegrees",
+                "does not say which columns are angles",
+                "write their units in the header, as 'elbow [deg]', and delete this line",
+                number,
+            )
+    return count
 
 
 def _header(
@@ -192,7 +253,9 @@ def _numbers(
             path,
             "row",
             f"has {len(cells)} cells where the header has {len(names)}",
-            "give every row one number per column",
+            "separate columns by semicolons, or write decimals with points"
+            if len(cells) == 2 * len(names)
+            else "give every row one number per column",
             line,
         )
     row = []

@@ -40,8 +40,20 @@ def test_columns_by_name(write):
         '"t","a"\n"0","1"\n1,"2"\n',
         "\ufefftime,a\n0,1\n1,2\n",
         "time [ms],a\n0,1\n1000,2\n",
+        "time\ta\n0\t1\n1\t2\n",
+        "  time   a\n  0 1\n  1   2\n",
+        '"time" "a"\n0 "1"\n1 2\n',
+        "time;a\n0;1,0\n1;2\n",
+        "time\ta\n0,0\t1\n1,000\t2\n",
+        "time,a\n0,1\n1,2\n".encode("utf-16"),
+        "\ufefftime\ta\n0\t1\n1\t2\n".encode("utf-16-be"),
+        "Coordinates\nversion=1\nnote=a, b; c\ninDegrees=no\nendheader\n\ntime\ta\n0\t1\n1\t2\n",
     ],
-    ids=["comments", "semicolons", "crlf", "cr", "quotes", "bom", "milliseconds"],
+    ids=[
+        *["comments", "semicolons", "crlf", "cr", "quotes", "bom", "milliseconds", "tabs"],
+        *["blanks", "blanks_quotes", "decimal_commas", "commas_and_tabs", "utf16", "utf16_be"],
+        "opensim",
+    ],
 )
 def test_dialects(write, content):
     table = read_table(write(content))
@@ -55,6 +67,14 @@ def test_units_in_the_header(write):
     assert table.names == ("a", "b", "c")
     assert table.dimensions == ("angle", "moment", "length")
     np.testing.assert_allclose(table.values[1], [math.pi, 7, 0.005])
+
+
+def test_units_where_blanks_separate(write):
+    table = read_table(write("time [ms]  a [N m]  b[deg]\n0 1 2\n1 2 180\n"))
+    assert table.names == ("a", "b")
+    assert table.dimensions == ("moment", "angle")
+    np.testing.assert_allclose(table.times, [0, 0.001])
+    np.testing.assert_allclose(table.values[1], [2, math.pi])
 
 
 GAP = "give a finite number in every cell"
@@ -72,6 +92,30 @@ GAP = "give a finite number in every cell"
         (
             "time,a\n",
             ":1: table: has no rows of numbers; give at least two (a constant needs no table)",
+        ),
+        (
+            "time,a\n0,5,1,25\n1,0,2,0\n",
+            ":2: row: has 4 cells where the header has 2; "
+            "separate columns by semicolons, or write decimals with points",
+        ),
+        (
+            "time;a\n0;1.5\n0,5;2\n",
+            ":3: table: numbers have commas and points; which are decimals is not clear; "
+            "write decimals with points, as 1234.5",
+        ),
+        (
+            "time;a\n0;1,000\n1;2,000\n",
+            ":3: table: commas may separate thousands or decimals; "
+            "write decimals with points, and no thousands apart",
+        ),
+        (
+            "Coordinates\ninDegrees=yes\nendheader\ntime\ta\n0\t1\n1\t2\n",
+            ":2: inDegrees: does not say which columns are angles; "
+            "write their units in the header, as 'elbow [deg]', and delete this line",
+        ),
+        (
+            "time\ta\n0\t1\n1\t\n",
+            ":3: row: has 1 cells where the header has 2; give every row one number per column",
         ),
         ("time,a\n0,1\n1,\n", f":3: column 'a': the cell is empty: a gap; {GAP}"),
         (
