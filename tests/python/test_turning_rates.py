@@ -104,7 +104,7 @@ def test_what_has_come_far_is_held_as_well(joint, offset, integrator):
 def test_an_armature_does_not_bend_a_straight_flight(joint, options, spin):
     model = body(joint, armature=0.5, **options)
     start = [1.0] + [0.0] * (model.nv - len(spin) - 1)
-    run = lw.simulate(model, duration=2, every=0.5, v0=[*start, *spin], quantities=None)
+    run = lw.simulate(model, duration=2, every=0.5, v0=[*start, *spin])
     line = run.time.values[:, None] * np.array(start)
     np.testing.assert_allclose(run.position[:, : len(start)], line, atol=1e-10)
     energy = run.kinetic_energy.values
