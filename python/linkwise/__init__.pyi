@@ -44,6 +44,7 @@ from linkwise.drives import Table as Table
 from linkwise.drives import Torque as Torque
 from linkwise.drives import Wrench as Wrench
 from linkwise.io.load import load as load
+from linkwise.notes import ModelWarning as ModelWarning
 from linkwise.results import Run as Run
 from linkwise.results import open_run as open_run
 from linkwise.scenario import load_scenario as load_scenario

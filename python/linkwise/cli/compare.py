@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from linkwise.cli.model import FloatingBase, PackageDirs, load_given
-from linkwise.cli.output import JsonOption, console, number, print_json, table, text
+from linkwise.cli.output import JsonOption, console, number, print_json, say_warnings, table, text
 from linkwise.cli.progress import live_steps
 
 
@@ -46,6 +46,7 @@ def compare(
     from linkwise.compare import driven_trajectory, free_trajectory
     from linkwise.compare import plot as draw
     from linkwise.io.writing import check_file, write_text
+    from linkwise.notes import plain_warnings, warnings_of
 
     if plot is not None and plot.suffix.lower() != ".svg":
         raise typer.BadParameter(f"{plot}: charts are written as SVG; name a file in .svg")
@@ -60,6 +61,7 @@ def compare(
         found = run_comparison(
             loaded, trajectory, tolerance=tolerance, stop=stop, time_limit=limit, progress=progress
         )
+    found["warnings"] = plain_warnings(warnings_of(loaded))
     if plot is not None:
         write_text(plot, draw(found) + "\n")
         found["plot"] = str(plot)
@@ -111,6 +113,7 @@ def _show(found: dict[str, Any]) -> None:
     for row in found["rows"]:
         if row["message"]:
             screen.print(f"{row['solver'] or row['method']}: {text(row['message'])}", markup=False)
+    say_warnings(found["warnings"])
     if "plot" in found:
         screen.print(f"Chart: {found['plot']}", markup=False)
 

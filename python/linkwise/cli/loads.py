@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from linkwise.cli.output import JsonOption, console, number, print_json, table, text
+from linkwise.cli.output import JsonOption, console, number, print_json, say_warnings, table, text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,11 +80,13 @@ def loads(
 
         write_report(opened, html, found, machine)
     if as_json:
-        print_json({"run": str(run), "peaks": records, "split": shares})
+        ignored = opened.warnings
+        print_json({"run": str(run), "peaks": records, "split": shares, "warnings": ignored})
         return
     screen = console()
     for made in tables(records, shares, joint):
         screen.print(made)
+    say_warnings(opened.warnings)
     for path in (csv, html):
         if path is not None:
             screen.print(f"Written: {path}", markup=False)

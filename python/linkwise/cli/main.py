@@ -84,6 +84,12 @@ def _is_wrong_input(error: Exception) -> bool:
     return core is not None and isinstance(error, core.InputError)
 
 
+def _is_of_a_model(message: Warning | str) -> bool:
+    """Whether `message` is a ModelWarning, without importing NumPy for it."""
+    notes = sys.modules.get("linkwise.notes")
+    return notes is not None and isinstance(message, notes.ModelWarning)
+
+
 def _exit_code() -> int:
     try:
         # Not standalone: Typer would print framed messages of several lines.
@@ -114,8 +120,12 @@ def _exit_code() -> int:
 
 
 def _warn(message: Warning | str, *_: object, **__: object) -> None:
-    """One line, without the place in the sources that Python adds."""
-    say(f"warning: {message}")
+    """One line, without the place in the sources that Python adds.
+
+    Commands say themselves what was ignored in a model, with what they show.
+    """
+    if not _is_of_a_model(message):
+        say(f"warning: {message}")
 
 
 def _open_standard_streams() -> None:

@@ -31,6 +31,14 @@ def say(message: str) -> str:
     return line
 
 
+def say_warnings(found: Sequence[Mapping[str, str]]) -> None:
+    """What was ignored or assumed when the machine was read, on stderr."""
+    from linkwise.notes import warning_lines
+
+    for line in warning_lines(found):
+        say(f"warning: {line}")
+
+
 def print_json(value: Mapping[str, Any]) -> None:
     from linkwise.base import json_value
 

@@ -18,6 +18,7 @@ from linkwise.cli.output import (
     peak_table,
     print_json,
     say,
+    say_warnings,
     shown_path,
     text,
 )
@@ -78,6 +79,7 @@ def summary(run: Run) -> dict[str, Any]:
     chosen = ("model", "model_hash", "method", "solver", "reason")
     found = {name: attrs.get(name) for name in (*names, *chosen, *counts)}
     found["run"] = shown_path(run.path) if run.path is not None else None
+    found["warnings"] = run.warnings
     found["samples"] = run.dataset.sizes["time"]
     return found
 
@@ -111,6 +113,7 @@ def show_run(run: Run, as_json: bool) -> None:
     )
     if beyond:
         screen.print(_limit_note(beyond), markup=False)
+    say_warnings(run.warnings)
     if run.path is None:
         screen.print("No results written: the run failed at its start, the older one was kept.")
     else:

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from linkwise.cli.output import FAILED, JsonOption, console, number, print_json, table, text
+from linkwise.cli.output import (
+    FAILED,
+    JsonOption,
+    console,
+    number,
+    print_json,
+    say_warnings,
+    table,
+    text,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,6 +46,7 @@ def sweep(
     """Simulate a SCENARIO with every combination of values, side by side."""
     from linkwise._core import InputError
     from linkwise.io.writing import check_file
+    from linkwise.notes import recorded_warnings
     from linkwise.record.export import write_netcdf
     from linkwise.scenario import parse_axis
     from linkwise.simulation.sweep import sweep as run_sweep
@@ -52,11 +62,14 @@ def sweep(
     if output is not None:
         write_netcdf(found, output)
     records = member_records(found, list(axes))
+    ignored = recorded_warnings(found.attrs)
     if as_json:
-        print_json({"output": None if output is None else str(output), "members": records})
+        where = None if output is None else str(output)
+        print_json({"output": where, "members": records, "warnings": ignored})
     else:
         screen = console()
         screen.print(_member_table(records, list(axes)))
+        say_warnings(ignored)
         if output is not None:
             screen.print(f"Written: {output}", markup=False)
     if any(record["outcome"] != "converged" for record in records):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from linkwise.cli.model import FloatingBase, PackageDirs
-from linkwise.cli.output import JsonOption, console, print_json, say
+from linkwise.cli.output import JsonOption, console, print_json, say, say_warnings
 
 if TYPE_CHECKING:
     from linkwise.view.source import Source
@@ -87,6 +87,8 @@ def view(
     source = open_source(target, options)
     for note in source.notes:
         say(note)
+    if not as_json:
+        say_warnings(source.warnings)
     if export is not None:
         _export(source, export, color == "rating", as_json)
     else:
@@ -118,6 +120,7 @@ def _export(source: Source, path: Path, by_rating: bool, as_json: bool) -> None:
             "frames": written.frames,
             "duration": written.duration,
             "bytes": written.bytes,
+            "warnings": list(source.warnings),
         },
         f"{written.path}: {written.frames} frames, {written.duration:g} s, "
         f"{written.bytes / 2**20:.1f} MiB. Opens in any browser, offline.",
@@ -130,7 +133,8 @@ def _serve(
     from linkwise.view.live import show
 
     def started(address: str) -> None:
-        _report(as_json, {"address": address}, f"{address} shows {source.title}; Ctrl-C ends.")
+        facts = {"address": address, "warnings": list(source.warnings)}
+        _report(as_json, facts, f"{address} shows {source.title}; Ctrl-C ends.")
 
     with contextlib.suppress(KeyboardInterrupt):
         show(

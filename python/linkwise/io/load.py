@@ -16,6 +16,7 @@ from linkwise.io.encoding import decode_xml
 from linkwise.io.files import MODEL_BYTES, read_bytes
 from linkwise.io.urdf import JointOrder, Mimic, read_urdf
 from linkwise.io.xml import local_name, parse_xml
+from linkwise.notes import tell, warnings_of
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 _HINTS = {
@@ -54,7 +55,8 @@ def load(
         move "independent" of each other, with a warning note.
 
     Raises InputError, in one line that names file, line, element and remedy, for anything that
-    cannot be read without guessing. What was ignored or assumed is in ``model.notes``.
+    cannot be read without guessing. What was ignored or assumed is in ``model.notes``; each note
+    of level "warning" is also a ModelWarning.
     The file may come from anywhere: nothing in it can reach the network or run code.
     """
     _check_choice(path, "joint_order", joint_order, get_args(JointOrder))
@@ -77,7 +79,7 @@ def load(
     root = parse_xml(path, xml)
     kind = local_name(root)
     if kind == "robot":
-        return read_urdf(
+        model = read_urdf(
             path,
             root,
             gravity=vector or STANDARD_GRAVITY,
@@ -86,6 +88,8 @@ def load(
             keep_fixed=keep_fixed,
             mimic=mimic,
         )
+        tell(warnings_of(model), reading=True)
+        return model
     if kind == "mujoco":
         from linkwise.io.mjcf import read_mjcf
         from linkwise.io.mjcf_limits import check_mjcf
@@ -103,7 +107,9 @@ def load(
                 "an MJCF file says itself which bodies float",
                 "leave it out, and give the root body a <freejoint/>",
             )
-        return read_mjcf(path, gravity=vector, keep_fixed=keep_fixed, xml=xml)
+        model = read_mjcf(path, gravity=vector, keep_fixed=keep_fixed, xml=xml)
+        tell(warnings_of(model), reading=True)
+        return model
     complain(
         path,
         f"element '{shorten(kind)}'",

@@ -17,6 +17,7 @@ from linkwise.loads.samples import (
     select,
     trapezoid_weights,
 )
+from linkwise.notes import kept_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -145,6 +146,7 @@ def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
             "joint": ("joint", joint_names(run)),
             "component": given["component"],
         },
+        attrs=kept_warnings(run.dataset.attrs),
     )
 
 
@@ -207,4 +209,5 @@ def peak_loads(run: RunLike) -> xr.Dataset:
         data[name] = ("joint", largest[k], attrs)
         at_attrs = {"long_name": f"time of the largest joint {name}", "units": "s"}
         data[f"{name}_time"] = ("joint", when[k], at_attrs)
-    return xr.Dataset(data, coords={"joint": ("joint", run.dataset["joint"].values)})
+    joints = {"joint": ("joint", run.dataset["joint"].values)}
+    return xr.Dataset(data, coords=joints, attrs=kept_warnings(run.dataset.attrs))

@@ -14,6 +14,7 @@ from linkwise._core import InputError
 from linkwise.io.writing import check_file, write_text
 from linkwise.loads.fatigue import damage_equivalent
 from linkwise.loads.peaks import envelope
+from linkwise.notes import recorded_warnings
 from linkwise.plot.report_figures import energy_figure, joint_figures, packed
 
 if TYPE_CHECKING:
@@ -190,6 +191,15 @@ def _health(run: RunLike, limits: xr.Dataset | None) -> str:
     return _table([], [_row([escape(a), escape(b)]) for a, b in facts], "facts")
 
 
+def _warnings(run: RunLike) -> str:
+    """What was ignored or assumed when the machine was read; the figures do not hold it."""
+    ignored = recorded_warnings(run.dataset.attrs)
+    if not ignored:
+        return ""
+    rows = [_row([escape(entry["element"]), escape(entry["text"])]) for entry in ignored]
+    return f"<h2>Warnings of the model</h2>{_table([], rows, 'facts')}"
+
+
 def _plotly() -> Any:
     try:
         import plotly.offline
@@ -246,6 +256,7 @@ def write_report(
         "<p class='note'>Wrench that the inboard body exerts on the outboard body, in the joint "
         "frame fixed in the outboard body, moments about the joint point. SI units. ± is the "
         "bound of algebraic and integration error.</p>",
+        _warnings(run),
         f"<h2>Peaks</h2>{_peak_table(summary, limits)}",
         f"<h2>Against the ratings</h2>{_margin_table(summary, left, limits)}"
         if left is not None

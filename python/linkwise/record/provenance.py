@@ -17,6 +17,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
+from linkwise.notes import warning_attrs, warnings_of
+
 if TYPE_CHECKING:
     from linkwise._core import Model
 
@@ -92,5 +94,6 @@ def provenance(
         **model_attrs(model),
         "options": json.dumps(dict(options), default=str),
         "scenario": scenario,
+        **warning_attrs(warnings_of(model)),
         "outcome": UNFINISHED,
     }

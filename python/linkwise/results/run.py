@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from linkwise._core import InputError
 from linkwise.base import printable
 from linkwise.loads.peaks import peak_loads
+from linkwise.notes import recorded_warnings, warning_lines
 from linkwise.plot.run_figures import RunPlots
 from linkwise.record.export import write_csv, write_netcdf
 from linkwise.record.model import read_model
@@ -78,6 +79,14 @@ class Run:
         """Whether the run reached its end."""
         return self.outcome == "converged"
 
+    @property
+    def warnings(self) -> list[dict[str, str]]:
+        """What was ignored or assumed when the machine was read: `element` and `text` of each.
+
+        Empty as well where an older linkwise wrote the run.
+        """
+        return recorded_warnings(self.dataset.attrs)
+
     def __repr__(self) -> str:
         return "\n".join(map(printable, self._summary()))
 
@@ -104,6 +113,7 @@ class Run:
             solver = attrs.get("solver", "none")
             by = attrs["method"] if solver == "none" else f"{attrs['method']} with {solver}"
             lines.append(f"  computed by {by}")
+        lines += [f"  warning     {line}" for line in warning_lines(self.warnings)]
         if self.path is not None:
             lines.append(f"  stored in   {self.path}")
         return lines

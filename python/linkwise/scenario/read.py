@@ -19,6 +19,7 @@ from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.files import SCENARIO_BYTES, read_bytes
 from linkwise.io.load import load
 from linkwise.loads.rating import Rating
+from linkwise.notes import quiet, tell, warnings_of
 from linkwise.scenario.arguments import ArgumentBuilder, ScenarioSource, key_path, with_inertias
 from linkwise.scenario.schema import RatingsFile, ScenarioFile, describe, keys_at
 
@@ -37,8 +38,15 @@ class Scenario(ScenarioSource):
     text: str
 
     def load_model(self) -> Model:
-        """The machine with its payloads. Raises InputError if it cannot be had."""
-        return with_inertias(self, self._bare_model())
+        """The machine with its payloads. Raises InputError if it cannot be had.
+
+        What was ignored or assumed is a ModelWarning each, as in `linkwise.load`.
+        """
+        with quiet():  # the scenario may cure what is wrong in the model's file
+            bare = self._bare_model()
+        model = with_inertias(self, bare)
+        tell(warnings_of(model), reading=True)
+        return model
 
     def ratings(self, model: Model) -> dict[str, Rating]:
         """What the joints may carry, by name. InputError for unknown joints."""

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from linkwise import _core
 from linkwise._core import InputError, Model
 from linkwise.base import Array
+from linkwise.notes import tell, warning_attrs, warnings_of
 from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
@@ -179,6 +180,8 @@ def simulate_batch(
         float(count) * sampled.size * schema.row_bytes,
         f"{sampled.size} samples of {count} members",
     )
+    ignored = warnings_of(*models)
+    tell(ignored, reading=False)
     columns, endings, interrupted = _core.simulate_members(
         simulations,
         q0=rows["q0"],
@@ -191,6 +194,7 @@ def simulate_batch(
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
     early = sum(ending.outcome != "converged" for ending in endings)
     attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)
+    attrs |= warning_attrs(ignored)
     attrs |= {"outcome": "converged" if not early else f"{early} of {count} members ended early"}
     dataset = dataset.assign_attrs({name: plain(value) for name, value in attrs.items()})
     if interrupted:

@@ -16,6 +16,7 @@ from linkwise import _core
 from linkwise._core import InputError
 from linkwise.drives import Motion, as_drive, as_wrench
 from linkwise.io.complaint import near
+from linkwise.notes import tell, warnings_of
 from linkwise.record.claim import check_target
 from linkwise.record.memory import MemoryRecord
 from linkwise.record.provenance import describe, provenance
@@ -239,6 +240,9 @@ def simulate(
     Raises:
         InputError: an argument is wrong; nothing was written.
         SimulationError: the simulation could not go on; `.run` holds the results until then.
+
+    What was ignored or assumed when the model was made is in `run.warnings`, and a ModelWarning
+    each where `linkwise.load` did not say it.
     """
     sampled = sample_times(duration, every, times)
     start = (
@@ -276,6 +280,7 @@ def simulate(
     attrs |= _chosen(simulation, by_joint, by_body)
     if output is None:
         _require_memory(schema, sampled.size)
+    tell(warnings_of(model), reading=False)
     recorder = _recorder(model, schema, attrs, sampled.size, output)
     run, ending = _record(model, simulation, recorder, schema, sampled, progress)
     if on_failure == "raise":

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.notes import Ignored, quiet, tell, warning_attrs, warnings_of
 from linkwise.scenario import Scenario, load_scenario, variant
 from linkwise.simulation.simulate import simulate
 
@@ -21,15 +22,19 @@ MOST_MEMBERS = 10_000
 
 def _simulate(scenario: Scenario) -> xr.Dataset:
     """One member, in a process of its own; its samples in memory."""
-    model = scenario.load_model()
-    arguments = scenario.simulate_arguments(model)
-    arguments["output"] = None
-    return simulate(model, **arguments, on_failure="return").dataset
+    with quiet():
+        model = scenario.load_model()
+        arguments = scenario.simulate_arguments(model)
+        arguments["output"] = None
+        return simulate(model, **arguments, on_failure="return").dataset
 
 
-def _check(scenario: Scenario) -> None:
-    """InputError for a member that cannot be simulated, before any member is."""
-    scenario.simulate_arguments(scenario.load_model())
+def _check(scenario: Scenario) -> list[Ignored]:
+    """What was ignored in a member; InputError if it cannot be simulated, before any member is."""
+    with quiet():
+        model = scenario.load_model()
+    scenario.simulate_arguments(model)
+    return warnings_of(model)
 
 
 def _coordinate(values: Sequence[Any]) -> Any:
@@ -59,7 +64,8 @@ def sweep(
     Returns:
         The runs' variables with a first dimension `member`, whose coordinates are the keys of
         `axes` and `outcome`. Samples after a member's end are NaN. Pick one out by
-        `linkwise.Run(dataset.sel(member=k))`.
+        `linkwise.Run(dataset.sel(member=k))`. What was ignored or assumed in any member is in the
+        attribute `warnings`, and one ModelWarning.
 
     Raises:
         InputError: a member is wrong; nothing was simulated.
@@ -74,8 +80,8 @@ def sweep(
     if len(combinations) > MOST_MEMBERS:
         raise InputError(f"axes: more than {MOST_MEMBERS} members; sweep fewer values")
     members = [variant(base, dict(zip(axes, values, strict=True))) for values in combinations]
-    for member in members:
-        _check(member)
+    ignored = dict.fromkeys(entry for member in members for entry in _check(member))
+    tell(ignored, reading=True)
     datasets = _run_all(members, processes, progress)
     joined = xr.concat(
         datasets,
@@ -92,7 +98,7 @@ def sweep(
     }
     outcomes = [str(dataset.attrs["outcome"]) for dataset in datasets]
     columns |= {"member": np.arange(len(members)), "outcome": ("member", outcomes)}
-    return joined.assign_coords(columns)
+    return joined.assign_coords(columns).assign_attrs(warning_attrs(ignored))
 
 
 def _run_all(

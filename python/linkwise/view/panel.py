@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from linkwise.notes import warning_lines
 from linkwise.view.arrows import color_bar, use_bar
 from linkwise.view.playback import SPEEDS, Playback
 
@@ -187,4 +188,5 @@ def headline(source: Source) -> str:
     model = source.model
     lines = [f"<b>{escape(source.title)}</b>: {model.n_joints} joints, {model.total_mass:.4g} kg"]
     lines += [escape(note) for note in source.notes]
+    lines += [escape(f"warning: {line}") for line in warning_lines(source.warnings)]
     return f'<div style="padding:4px 12px;font-size:13px">{"<br>".join(lines)}</div>'

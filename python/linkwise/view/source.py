@@ -16,6 +16,7 @@ from linkwise.io.complaint import near
 from linkwise.io.load import load
 from linkwise.io.urdf_visuals import Appearance, read_appearance
 from linkwise.loads.samples import held_model, model_of, rows
+from linkwise.notes import plain_warnings, warnings_of
 from linkwise.record.model import read_model
 from linkwise.results import Run, open_run
 from linkwise.scenario import load_ratings, load_scenario, ratings_in
@@ -127,7 +128,11 @@ class Recording:
 
 @dataclass(frozen=True)
 class Source:
-    """A model, how its links look, and the samples of a run (None: the model alone)."""
+    """A model, how its links look, and the samples of a run (None: the model alone).
+
+    notes: what is not shown as it looks; warnings: what was ignored or assumed when the model was
+    read.
+    """
 
     title: str
     model: Model
@@ -135,6 +140,7 @@ class Source:
     recording: Recording | None = None
     ratings: Mapping[str, Rating] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    warnings: Sequence[Mapping[str, str]] = ()
 
 
 def static_loads(model: Model, q: Array) -> Array:
@@ -159,7 +165,8 @@ def open_source(target: PathLike, options: Options) -> Source:
     appearance = Appearance([], [], []) if file is None else read_appearance(file, package_dirs)
     held = load_scenario(path).text if path.suffix.lower() == ".toml" else ""
     ratings = _ratings(options, held)
-    return Source(model.name, model, appearance, None, ratings, _notes(appearance))
+    ignored = plain_warnings(warnings_of(model))
+    return Source(model.name, model, appearance, None, ratings, _notes(appearance), ignored)
 
 
 def _ratings(options: Options, scenario: str) -> Mapping[str, Rating]:
@@ -206,7 +213,8 @@ def _open_run(path: Path, options: Options) -> Source:
             raise InputError("causes: are those of loads, and --no-loads hides them; leave one out")
         recording.causes.choose(options.causes)
     ratings = _ratings(options, str(run.dataset.attrs.get("scenario", "")))
-    return Source(model.name, model, appearance, recording, ratings, _notes(appearance))
+    notes = _notes(appearance)
+    return Source(model.name, model, appearance, recording, ratings, notes, run.warnings)
 
 
 def _file_beside(path: Path, name: str) -> Path | None:
