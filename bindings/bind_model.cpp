@@ -51,6 +51,8 @@ PyModel* with_link(const PyModel& self, const std::string& link, nb::handle mass
       link_spec(link, mass.is_none() ? old.mass : nb::cast<double>(mass), com, inertia);
   if (com.is_none()) given.com = old.com;
   if (inertia.is_none()) given.inertia = old.inertia;
+  given.body_kind = old.body_kind;
+  given.parameters = old.parameters;
   old = std::move(given);
   return new PyModel(std::move(spec));
 }
@@ -212,7 +214,10 @@ void bind_joints(ModelClass& c) {
           [](const PyModel& s) {
             std::vector<double> masses;
             for (const auto& j : s.model->joints)
-              masses.push_back(j.last_of_body ? s.model->constants[j.body].inertia.m : 0);
+              masses.push_back(
+                  j.last_of_body
+                      ? with_body(*s.model, j.body, [](const auto& body) { return mass(body); })
+                      : 0.0);
             return to_numpy(masses);
           },
           nb::rv_policy::move,

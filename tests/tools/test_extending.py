@@ -1,7 +1,8 @@
 """docs/extending.md says how many files an addition takes: here each one is made, and counted.
 
 tests/extending/NAME.patch adds one throw-away thing. It must still apply, touch as many files as
-the table promises, and the compiler must accept every file that it touches.
+the table promises, and the compiler must accept every file that it touches. Where
+tests/extending/NAME.cpp is beside it, that program uses the addition, and must find nothing wrong.
 """
 
 import os
@@ -23,6 +24,9 @@ FLAGS = (
     "-DLINKWISE_ASSERTIONS=1",
     "-DLINKWISE_LANES=4",
 )
+#: Sources of the core, and the one of the methods that the programs need.
+CORE = "src/linkwise"
+KNOWN_BODIES = "src/linkwise/dynamics/known_bodies.cpp"
 
 pytestmark = pytest.mark.skipif(shutil.which("git") is None, reason="patches need git")
 
@@ -43,6 +47,18 @@ def run(*command, cwd):
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"{' '.join(map(str, command))}\n{done.stdout}{done.stderr}"
     return done.stdout
+
+
+def run_program(program, root):
+    """Compiles a program with all that builds a model, as one text to be quick, and runs it."""
+    layers = ("base", "exec", "graph", "model")
+    paths = [path for layer in layers for path in sorted((root / CORE / layer).glob("*.cpp"))]
+    text = "".join(f'#include "{path}"\n' for path in paths)
+    (root / "core.cpp").write_text(text, encoding="utf-8")
+    flags = [flag for flag in FLAGS if flag != "-fsyntax-only"]
+    sources = (program, root / KNOWN_BODIES, "core.cpp")
+    run(COMPILER, *flags, "-pthread", "-I", "src", *sources, "-o", "program", cwd=root)
+    run(root / "program", cwd=root)
 
 
 @pytest.fixture
@@ -72,6 +88,10 @@ def test_an_addition_takes_as_many_files_as_promised(patch, changed):
     assert COMPILER or not sources, "no C++ compiler; set CXX, or install g++"
     for source in sources:
         run(COMPILER, *FLAGS, "-I", "src", source, cwd=root)
+    program = patch.with_suffix(".cpp")
+    if program.exists():
+        assert COMPILER, "no C++ compiler; set CXX, or install g++"
+        run_program(program, root)
     for name in files:
         if name.endswith(".py"):
             run(sys.executable, "-m", "py_compile", name, cwd=root)

@@ -22,7 +22,7 @@ TreeSystem::TreeSystem(const Model& model, const Executor& executor)
   std::vector<int> parent, dim;
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int n = 0; n < model.n_bodies(); ++n) {
-    compliance_.push_back(compliance(model.constants[n].inertia));
+    compliance_.push_back(compliance(model.constants[n].rigid));
     const BodyTopology& body = model.topology[n];
     parent.push_back(body.parent);
     dim.push_back(constraint_rows(model, n));
@@ -75,15 +75,10 @@ void TreeSystem::assemble_node(int n, const SweepInput<double>& in) {
 
   Matrix6<double> W = to_matrix(compliance_[n]), K{};
   if (parent >= 0) {
-    const Matrix6<double> L = to_matrix(compliance_[parent]);  // symmetric: rows are columns
-    for (int j = 0; j < 6; ++j) {
-      const Vector6<double> column = to_array(X * to_motion(&L[6 * j]));
-      for (int i = 0; i < 6; ++i) K[6 * i + j] = column[i];
-    }
-    for (int i = 0; i < 6; ++i) {
-      const Vector6<double> row = to_array(X * to_motion(&K[6 * i]));
-      for (int j = 0; j < 6; ++j) W[6 * i + j] += row[j];
-    }
+    const RigidBody<double>& carrier = model.constants[parent].rigid;
+    K = compliance(carrier, compliance_[parent], X);
+    const Matrix6<double> at_port = compliance(carrier, K, X);
+    for (int i = 0; i < 36; ++i) W[i] += at_port[i];
   }
   Block& D = A_.diag[n];
   for (int c = 0; c < rows; ++c) {

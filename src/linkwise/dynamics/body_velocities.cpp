@@ -99,7 +99,7 @@ void BodyVelocities::calc_states(const SweepInput<double>& in, BodyState<double>
       state.c = cross(state.X * v_parent, relative);
     }
     state.v = v_[n];
-    state.bias = momentum_bias(model_->constants[n].inertia, v_[n]);
+    state.bias = momentum_bias(model_->constants[n].rigid, v_[n]);
     state.bias += external;
   }
 }

@@ -40,7 +40,8 @@ void CompositeRigidBody::calc_columns(const double* q) {
   SweepInput<double> in;
   in.q = q;
   columns_.update(in);
-  for (int n = 0; n < model.n_bodies(); ++n) composite_[n] = model.constants[n].inertia;
+  for (int n = 0; n < model.n_bodies(); ++n)
+    composite_[n] = with_body(model, n, [](const auto& body) { return frozen_inertia(body); });
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int n = model.n_bodies() - 1; n >= 0; --n) {
     const int parent = model.topology[n].parent;

@@ -38,7 +38,7 @@ class ConstraintElimination {
         refinement_(model) {
     require_regular_inertias(model);
     for (int n = 0; n < model.n_bodies(); ++n)
-      compliance_.push_back(compliance(model.constants[n].inertia));
+      compliance_.push_back(compliance(model.constants[n].rigid));
     for_bodies_base_to_tip(model.kind_ranges, [&](auto joint, int n) {
       using J = decltype(joint);
       if constexpr (!is_general<J>)
@@ -123,7 +123,7 @@ class ConstraintElimination {
         store(w.v, outward_velocity<J>(MovedAxis<J, S>{k, w.axis.at}, v_parent, k.pitch,
                                        in.v ? in.v[body.v] : S{}));
       }
-      const Force<S> h = momentum_bias(k.inertia, w.v);
+      const Force<S> h = momentum_bias(k.rigid, w.v);
       w.g = {-h.lin, -h.ang};
       if constexpr (is_general<J>)
         stack_[body.general].add_drives(armature(), in.tau, w.g, g_parent);

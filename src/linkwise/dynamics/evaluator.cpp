@@ -288,6 +288,7 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
     throw InputError("method '" + method +
                      "' does not split loads; use articulated_body or constraint_force");
   const bool by_force = method == "constraint_force";
+  require_known_bodies(m, find_dynamics(method));
   if (by_force) require_regular_inertias(m);
   BatchInput s = states;
   std::vector<double> passive;

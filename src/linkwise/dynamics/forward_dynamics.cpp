@@ -88,25 +88,25 @@ std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model,
   return std::make_unique<ConstraintForce>(model, options);
 }
 
-// name, description, reference, uses a solver, chains only, linear time
+// name, description, reference, uses a solver, chains only, any body, linear time
 constexpr DynamicsEntry table[] = {
     {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false,
-     false, true, make_articulated_body},
+     false, true, true, make_articulated_body},
     {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993",
-     true, false, true, make_constraint_force},
+     true, false, false, true, make_constraint_force},
     {"piecewise",
      "one long revolute chain in pieces: recursion inside, constraint forces between, on lanes and "
      "threads",
-     "anderson2000", true, true, true, make_method<Piecewise>},
+     "anderson2000", true, true, false, true, make_method<Piecewise>},
     {"composite_rigid_body",
      "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)", "walker1982", false,
-     false, false, make_recursion<CompositeRigidBody>},
+     false, true, false, make_recursion<CompositeRigidBody>},
     {"joint_space_conjugate_gradient",
      "conjugate gradients on the joint-space mass matrix, one inverse dynamics per iteration",
-     "lee1988", false, false, false, make_method<JointSpaceConjugateGradient>},
+     "lee1988", false, false, true, false, make_method<JointSpaceConjugateGradient>},
     {"global_projection",
      "all bodies' motion equations projected on what the joints let through, O(N^3)", "hughes1985",
-     false, false, false, make_recursion<GlobalProjection>},
+     false, false, true, false, make_recursion<GlobalProjection>},
 };
 
 /// A method on a machine with armatures whose axes turn.
@@ -171,6 +171,7 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
     }
   }
   const DynamicsEntry& entry = find_dynamics(choice.method);
+  require_known_bodies(model, entry);
   if (!entry.uses_solver)
     choice.solver = "";
   else if (choice.solver == "auto")

@@ -45,6 +45,7 @@ struct DynamicsEntry {
   std::string_view reference;  ///< key in references.bib
   bool uses_solver;
   bool chains_only;  ///< takes one kind of machine; the others take every tree
+  bool any_body;     ///< takes bodies of every kind; the others take rigid ones
   bool linear_time;  ///< the work grows as the number of bodies; the others are for short chains
   std::unique_ptr<DynamicsMethod> (*make)(const Model&, const DynamicsOptions&);
 };
@@ -52,6 +53,9 @@ struct DynamicsEntry {
 std::span<const DynamicsEntry> dynamics_table();
 /// InputError, listing the known names, when the name is unknown.
 const DynamicsEntry& find_dynamics(std::string_view name);
+
+/// InputError naming the first body of a kind that a method does not take.
+void require_known_bodies(const Model& model, const DynamicsEntry& method);
 
 /// What "auto" stands for on this model, and why.
 struct Choice {

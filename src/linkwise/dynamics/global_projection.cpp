@@ -45,15 +45,17 @@ void GlobalProjection::project(const SweepInput<double>& in) {
   rhs_.assign(size, 0.0);
   const Motion<double> ground = ground_acceleration<double>(model, in.gravity_factor);
   for (int n = 0; n < model.n_bodies(); ++n) {
-    const Inertia<double>& M = model.constants[n].inertia;
+    const auto times = [&](const Motion<double>& a) {
+      return with_body(model, n, [&](const auto& body) { return inertia_times(body, a); });
+    };
     const int parent = model.topology[n].parent;
     a0_[n] = columns_.state(n).X * (parent >= 0 ? a0_[parent] : ground);
     a0_[n] += columns_.state(n).c;
-    Force<double> load = M * a0_[n];
+    Force<double> load = times(a0_[n]);
     load += columns_.state(n).bias;
     for (size_t i = 0; i < J_[n].size(); ++i) {
       rhs_[where_[n][i]] -= dot(J_[n][i], load);
-      const Force<double> MJ = M * J_[n][i];
+      const Force<double> MJ = times(J_[n][i]);
       double* row = &H_[size * where_[n][i]];
       for (size_t j = 0; j <= i; ++j) row[where_[n][j]] += dot(J_[n][j], MJ);
     }

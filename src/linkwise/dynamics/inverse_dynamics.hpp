@@ -45,7 +45,7 @@ class InverseDynamics {
     const Model& model = *model_;
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
     const auto acceleration_of = [&](int n) -> const Motion<S>& { return a_[n]; };
-    const auto step = [&](auto joint, int n, const Motion<S>& a_parent) {
+    const auto step = [&](auto joint, int n, const auto& own, const Motion<S>& a_parent) {
       using J = decltype(joint);
       const BodyTopology& body = model.topology[n];
       const BodyConstants<double>& k = model.constants[n];
@@ -57,9 +57,9 @@ class InverseDynamics {
         add_rates(general_[body.general], du, a);
       a_[n] = a;
       w_[n] = {};
-      inward_load(k.inertia, a, state_[n].bias, w_[n]);
+      inward_load(own, a, state_[n].bias, w_[n]);
     };
-    sweep_outward(model, model.kind_ranges, ground, acceleration_of, step);
+    sweep_bodies_outward(model, model.kind_ranges, ground, acceleration_of, step);
   }
 
   void tip_to_base(const SweepInput<S>& in, S* tau) {

@@ -25,7 +25,8 @@ JointSpaceConjugateGradient::JointSpaceConjugateGradient(const Model& model,
 bool JointSpaceConjugateGradient::calc_diagonal() {
   const Model& model = *model_;
   const std::vector<double>& armature = model.dof_values(DofProperty::armature);
-  for (int n = 0; n < model.n_bodies(); ++n) composite_[n] = model.constants[n].inertia;
+  for (int n = 0; n < model.n_bodies(); ++n)
+    composite_[n] = with_body(model, n, [](const auto& body) { return frozen_inertia(body); });
   for (int n = model.n_bodies() - 1; n >= 0; --n) {
     for (int k = columns_.first(n); k < columns_.first(n + 1); ++k) {
       const Motion<double>& P = columns_.P(k);
@@ -54,7 +55,7 @@ void JointSpaceConjugateGradient::multiply(std::span<const double> x, std::span<
       a += Motion<double>{x[k] * P.lin, x[k] * P.ang};
     }
     a_[n] = a;
-    w_[n] = momentum(model.constants[n].inertia, a);
+    w_[n] = with_body(model, n, [&](const auto& body) { return inertia_times(body, a); });
   }
   const std::vector<double>& armature = model.dof_values(DofProperty::armature);
   for (int n = model.n_bodies() - 1; n >= 0; --n) {

@@ -63,7 +63,7 @@ bool Mobility::tip_to_base() {
   std::fill(Y_.begin(), Y_.end(), ArticulatedInertia<double>{});
   for (int n = model.n_bodies() - 1; n >= 0; --n) {
     ArticulatedInertia<double>& Y = Y_[n];
-    add_inertia(Y, model.constants[n].inertia);
+    with_body(model, n, [&](const auto& body) { add_inertia(Y, body); });
     for (int k = columns_.first(n + 1) - 1; k >= columns_.first(n); --k) {
       const double D = eliminate<ColumnJoint>(Y, Force<double>{}, columns_.P(k),
                                               armature[columns_.dof(k)], 0.0, axis_[k]);

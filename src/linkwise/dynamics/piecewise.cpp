@@ -35,8 +35,7 @@ class PiecewiseChain {
       LaneBodies<Group> bodies(model, length_, [&](int k, int l) { return body_at(g, l, k); });
       // The first body of a piece of fillers must have an inertia to invert. It acts on nothing.
       for (int l = 0; l < native_lanes; ++l)
-        if (body_at(g, l, 0) >= n_)
-          set_lanes<Group>(bodies[0].inertia, l, RigidBody<double>{1, {}, {{1, 0, 1, 0, 0, 1}}});
+        if (body_at(g, l, 0) >= n_) set_lanes<Group>(bodies[0].body, l, unit_body());
       groups_.emplace_back(std::move(bodies));
     }
     cuts_.resize(groups_.size());
@@ -250,7 +249,8 @@ bool Piecewise::suits(const Model& model) {
   for (int n = 0; n < model.n_bodies(); ++n) {
     const BodyTopology& body = model.topology[n];
     const bool kind = body.joint_kind == JointKind::hinge || body.joint_kind == JointKind::revolute;
-    if (!kind || body.parent != n - 1 || body.q != n) return false;
+    if (!kind || body.body_kind != BodyKind::rigid || body.parent != n - 1 || body.q != n)
+      return false;
   }
   return model.singular_body() < 0;
 }

@@ -92,7 +92,8 @@ double kinetic_energy(const Model& model, const double* q, const double* v) {
   const auto states = states_of(model, q, v);
   double energy = 0;
   for (int n = 0; n < model.n_bodies(); ++n)
-    energy += 0.5 * dot(states[n].v, momentum(model.constants[n].inertia, states[n].v));
+    energy +=
+        with_body(model, n, [&](const auto& body) { return kinetic_energy(body, states[n].v); });
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int i = 0; i < model.nv(); ++i) energy += 0.5 * armature[i] * v[i] * v[i];
   return energy;
@@ -103,8 +104,8 @@ double potential_energy(const Model& model, const double* q) {
   double energy = passive_potential(model, q);
   for (int n = 0; n < model.n_bodies(); ++n) {
     const auto& X = frames[model.topology[n].first_element + model.topology[n].n_elements - 1];
-    const Inertia<double>& M = model.constants[n].inertia;
-    energy -= dot(model.gravity, M.m * X.r + transpose_times(X.R, M.mc));
+    energy += with_body(model, n,
+                        [&](const auto& body) { return potential_energy(body, X, model.gravity); });
   }
   return energy;
 }
@@ -115,7 +116,8 @@ void momentum(const Model& model, const double* q, const double* v, double* h) {
   Force<double> total;
   for (int n = 0; n < model.n_bodies(); ++n) {
     const auto& X = frames[model.topology[n].first_element + model.topology[n].n_elements - 1];
-    total += transpose_times(X, momentum(model.constants[n].inertia, states[n].v));
+    total += transpose_times(
+        X, with_body(model, n, [&](const auto& body) { return momentum(body, states[n].v); }));
   }
   const double values[6] = {total.lin.x, total.lin.y, total.lin.z,
                             total.ang.x, total.ang.y, total.ang.z};

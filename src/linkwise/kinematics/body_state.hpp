@@ -54,7 +54,17 @@ LW_INLINE void dispatch_kind_range(const KindRange& range, F&& f) {
 template <class J>
 inline constexpr bool is_general = std::is_same_v<J, GeneralJoint>;
 
-/// f(joint, n) for the bodies of some ranges.
+/// Calls f(joint, bodies, begin, end), where bodies[n] is a body of a kind known while compiling.
+template <class F>
+LW_INLINE void dispatch_bodies(const Model& model, const KindRange& range, F&& f) {
+  dispatch_kind_range(range, [&](auto joint, int begin, int end) {
+    BodyKinds::dispatch(range.body_kind, [&](auto kind) {
+      f(joint, BodiesOfKind<typename decltype(kind)::Body>{model}, begin, end);
+    });
+  });
+}
+
+/// f(joint, n) for the bodies of some ranges; with the model at hand f(joint, n, body n).
 template <class F>
 LW_INLINE void for_bodies_base_to_tip(const std::vector<KindRange>& ranges, F&& f) {
   for (const KindRange& range : ranges)
@@ -70,6 +80,23 @@ LW_INLINE void for_bodies_tip_to_base(const std::vector<KindRange>& ranges, F&& 
     });
 }
 
+template <class F>
+LW_INLINE void for_bodies_base_to_tip(const Model& model, const std::vector<KindRange>& ranges,
+                                      F&& f) {
+  for (const KindRange& range : ranges)
+    dispatch_bodies(model, range, [&](auto joint, auto bodies, int begin, int end) {
+      for (int n = begin; n < end; ++n) f(joint, n, bodies[n]);
+    });
+}
+template <class F>
+LW_INLINE void for_bodies_tip_to_base(const Model& model, const std::vector<KindRange>& ranges,
+                                      F&& f) {
+  for (size_t i = ranges.size(); i-- > 0;)
+    dispatch_bodies(model, ranges[i], [&](auto joint, auto bodies, int begin, int end) {
+      for (int n = end - 1; n >= begin; --n) f(joint, n, bodies[n]);
+    });
+}
+
 /// The outward loop of every recursion: step(joint, n, the parent's motion), where of(n) is the
 /// motion of body n, found before, and `ground` that of the ground. By reference: a copy would be
 /// loaded in wide words that the narrow stores just before it cannot be forwarded to, a stall of a
@@ -81,6 +108,17 @@ LW_INLINE void sweep_outward(const Model& model, const std::vector<KindRange>& r
     const int parent = model.topology[n].parent;
     const Motion<S>& carried = parent >= 0 ? of(parent) : ground;
     step(joint, n, carried);
+  });
+}
+
+/// The same with step(joint, n, body n, the parent's motion).
+template <class S, class Of, class Step>
+LW_INLINE void sweep_bodies_outward(const Model& model, const std::vector<KindRange>& ranges,
+                                    const Motion<S>& ground, Of&& of, Step&& step) {
+  for_bodies_base_to_tip(model, ranges, [&](auto joint, int n, const auto& own) {
+    const int parent = model.topology[n].parent;
+    const Motion<S>& carried = parent >= 0 ? of(parent) : ground;
+    step(joint, n, own, carried);
   });
 }
 
@@ -136,7 +174,7 @@ template <class S>
 void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states,
                       GeneralState<S>* general) {
   const auto velocity = [&](int n) -> const Motion<S>& { return states[n].v; };
-  const auto step = [&](auto joint, int n, const Motion<S>& v_parent) {
+  const auto step = [&](auto joint, int n, const auto& own, const Motion<S>& v_parent) {
     using J = decltype(joint);
     const BodyTopology& body = model.topology[n];
     const BodyConstants<double>& k = model.constants[n];
@@ -151,9 +189,9 @@ void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>*
       s.c = J::bias(v, k.pitch, u);
       s.v = v;
     }
-    s.bias = momentum_bias(k.inertia, s.v);
+    s.bias = momentum_bias(own, s.v);
   };
-  sweep_outward(model, model.kind_ranges, Motion<S>{}, velocity, step);
+  sweep_bodies_outward(model, model.kind_ranges, Motion<S>{}, velocity, step);
   for_external_wrenches(model, in, [&](int n, const Force<S>& w) { states[n].bias -= w; });
 }
 

@@ -3,8 +3,6 @@
 #include <cmath>
 #include <optional>
 
-#include "linkwise/spatial/composite.hpp"
-
 namespace linkwise {
 namespace {
 
@@ -78,7 +76,10 @@ void choose_hinge_frames(Bodies& bodies, PlacedJoints& placed) {
     }
     if (has_frame[n]) {
       k.tree = frame[n] * k.tree;
-      k.inertia = transform_to_parent(inverse(frame[n]), k.inertia);
+      BodyKinds::dispatch(body.body_kind, [&](auto kind) {
+        auto& own = body_of_kind<typename decltype(kind)::Body>(body, k, bodies.others);
+        own = moved(own, inverse(frame[n]));
+      });
     }
     if (body.joint_kind == JointKind::hinge) set_hinge(k);
     if (body.joint_kind != JointKind::general) first.placement = k.tree;

@@ -42,6 +42,15 @@ void check_inertia(const Machine& machine, int l, bool welded, const Inertia<dou
                    " kg m2); give a positive semidefinite inertia about the centre of mass");
 }
 
+/// Only rigid bodies become one by a weld.
+void check_weld(const Machine& machine, int lead, int child, const std::string& joint) {
+  for (const int l : {lead, child})
+    if (const LinkSpec& link = machine.spec.links[l]; link.body_kind != BodyKind::rigid)
+      throw InputError("link '" + link.name + "'" + machine.where + " is of kind " +
+                       body_kind_name(link.body_kind) + ", and joint '" + joint +
+                       "' welds it to another link; keep fixed joints, or let the joint move");
+}
+
 /// A lump without mass may carry one joint, or several in the recursion. What hangs on a light one
 /// is find_undetermined's business.
 void check_massless(const Machine& machine, const Lumps& lumps, std::vector<Note>& notes) {
@@ -77,6 +86,7 @@ LumpedInertia lump_inertia(const Machine& machine, const Lumps& lumps, std::vect
     const JointSpec& s = machine.joint(j);
     const auto& [parent, child, freedom, acts, weld] = machine.graph.joints[j];
     const int lead = lumps.lead[child];
+    check_weld(machine, lead, child, s.name);
     out.from_lead[child] =
         Transform<double>{transpose(s.rotation), s.translation} * out.from_lead[parent];
     out.inertia[lead] += transform_to_parent(out.from_lead[child], about_origin(spec.links[child]));

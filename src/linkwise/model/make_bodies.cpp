@@ -3,7 +3,6 @@
 #include <span>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/spatial/composite.hpp"
 
 namespace linkwise {
 namespace {
@@ -41,6 +40,24 @@ void classify(const PlacedJoints& placed, BodyTopology& body, BodyConstants<doub
                                                      : JointKind::revolute;
 }
 
+/// Body b from its link and the inertia of all that is welded to it. X takes the body frame to the
+/// link's.
+void set_body(const LinkSpec& link, const Inertia<double>& inertia, const Transform<double>& X,
+              Bodies& out, int b) {
+  BodyTopology& at = out.topology[b];
+  at.body_kind = link.body_kind;
+  BodyKinds::dispatch(at.body_kind, [&](auto kind) {
+    using B = typename decltype(kind)::Body;
+    if constexpr (!std::is_same_v<B, RigidBody<double>>) {
+      std::vector<B>& bodies = std::get<std::vector<B>>(out.others);
+      at.of_kind = static_cast<int>(bodies.size());
+      bodies.emplace_back();
+    }
+    body_of_kind<B>(at, out.constants[b], out.others) =
+        moved(B::make(RigidBody<double>{inertia}, link.parameters), X);
+  });
+}
+
 }  // namespace
 
 Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const BodyTree& tree,
@@ -64,13 +81,12 @@ Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const Bo
       body.n_elements += joint.n_elements;
     }
     check_stack(machine, placed, stack, body.nv, notes);
-    const Inertia<double>& inertia = lumped.inertia[given.link];
-    // From the link's axes to the body frame's.
-    constants.inertia = transform_to_parent(placed.joints[stack.back()].to_user, inertia);
+    set_body(machine.spec.links[given.link], lumped.inertia[given.link],
+             placed.joints[stack.back()].to_user, out, b);
     constants.tree = placed.elements[body.first_element + body.n_elements - 1].placement;
     classify(placed, body, constants);
     if (body.joint_kind == JointKind::general) body.general = out.n_general++;
-    if (out.singular < 0 && is_singular(inertia)) out.singular = b;
+    if (out.singular < 0 && is_singular(lumped.inertia[given.link])) out.singular = b;
     if (body.parent >= 0) ++out.topology[body.parent].n_children;
   }
   return out;

@@ -1,5 +1,5 @@
 #pragma once
-// The arrays over bodies: how each is joined, and its constants.
+// The arrays over bodies: how each is joined, its constants, and what it is.
 #include "linkwise/model/place_joints.hpp"
 
 namespace linkwise {
@@ -7,6 +7,7 @@ namespace linkwise {
 struct Bodies {
   std::vector<BodyTopology> topology;
   std::vector<BodyConstants<double>> constants;
+  BodyKinds::Bodies others;  ///< that are not rigid
   int n_general = 0;
   int singular = -1;  ///< the first whose inertia is singular, -1: none
 };

@@ -53,6 +53,7 @@ Model::Model(ModelSpec given) : spec_(std::move(given)) {
   singular_body_ = bodies.singular;
   topology = std::move(bodies.topology);
   constants = std::move(bodies.constants);
+  other_bodies = std::move(bodies.others);
   kind_ranges = ranges_of(topology);
   elements = std::move(placed.elements);
   joints = std::move(placed.joints);

@@ -11,12 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "linkwise/bodies/rigid.hpp"
+#include "linkwise/bodies/body_kinds.hpp"
 #include "linkwise/joints/element.hpp"
 #include "linkwise/model/joint_types.hpp"
 #include "linkwise/model/name_index.hpp"
 #include "linkwise/model/spec.hpp"
-#include "linkwise/spatial/inertia.hpp"
 
 namespace linkwise {
 
@@ -28,6 +27,8 @@ enum class JointKind : std::uint8_t { hinge, revolute, geared, prismatic, helica
 struct BodyTopology {
   int parent = -1;  ///< body index, -1: ground
   JointKind joint_kind = JointKind::general;
+  BodyKind body_kind = BodyKind::rigid;
+  int of_kind = -1;  ///< index among the bodies of its kind, unless rigid
   int first_element = 0, n_elements = 0;
   int q = 0, nq = 0, v = 0, nv = 0;
   int n_children = 0;
@@ -36,26 +37,38 @@ struct BodyTopology {
 
 template <class C>
 struct BodyConstants {
-  Transform<C> tree;  ///< previous frame -> body frame at zero; what one-element bodies need
-  RigidBody<C> inertia;
+  Transform<C> tree;   ///< previous frame -> body frame at zero; what one-element bodies need
+  RigidBody<C> rigid;  ///< the body, where it is rigid
   C pitch{}, armature{};
   /// Of a hinge, after [denavit1955]: from the parent turn about x by alpha, go a along x and d
   /// along the new z, turn about z by q + theta.
   C cos_alpha{}, sin_alpha{}, a{}, d{}, theta{};
 };
 
-/// Bodies [begin, end) on joints of one kind.
+/// Bodies [begin, end) of one kind on joints of one kind.
 struct KindRange {
   JointKind joint_kind;
+  BodyKind body_kind;
   int begin, end;
 };
 
 /// Body n, the next one of its kind or the first of a new range.
 inline void append_to_ranges(std::vector<KindRange>& ranges, const BodyTopology& body, int n) {
-  if (!ranges.empty() && ranges.back().end == n && ranges.back().joint_kind == body.joint_kind)
+  if (!ranges.empty() && ranges.back().end == n && ranges.back().joint_kind == body.joint_kind &&
+      ranges.back().body_kind == body.body_kind)
     ++ranges.back().end;
   else
-    ranges.push_back({body.joint_kind, n, n + 1});
+    ranges.push_back({body.joint_kind, body.body_kind, n, n + 1});
+}
+
+/// The body itself, of kind B. Rigid ones are kept with the constants of their joints, because the
+/// sweeps read both together.
+template <class B, class Constants, class Bodies>
+LW_INLINE auto& body_of_kind(const BodyTopology& at, Constants& constants, Bodies& others) {
+  if constexpr (std::is_same_v<B, RigidBody<double>>)
+    return constants.rigid;
+  else
+    return std::get<std::vector<B>>(others)[at.of_kind];
 }
 
 struct JointInfo {
@@ -113,6 +126,7 @@ class Model {
 
   std::vector<BodyTopology> topology;
   std::vector<BodyConstants<double>> constants;
+  BodyKinds::Bodies other_bodies;  ///< that are not rigid
   std::vector<Element> elements;
   std::vector<KindRange> kind_ranges;
   std::vector<JointInfo> joints;
@@ -136,5 +150,22 @@ class Model {
   std::string undetermined_;
   NameIndex joint_by_name_, link_by_name_;
 };
+
+/// The bodies of a range, whose kind is known while compiling.
+template <class B>
+struct BodiesOfKind {
+  const Model& model;
+  LW_INLINE const B& operator[](int n) const {
+    return body_of_kind<B>(model.topology[n], model.constants[n], model.other_bodies);
+  }
+};
+
+/// f(body n). Loops that count dispatch once per range instead (kinematics/body_state.hpp).
+template <class F>
+LW_INLINE decltype(auto) with_body(const Model& model, int n, F&& f) {
+  return BodyKinds::dispatch(model.topology[n].body_kind, [&](auto kind) -> decltype(auto) {
+    return f(BodiesOfKind<typename decltype(kind)::Body>{model}[n]);
+  });
+}
 
 }  // namespace linkwise

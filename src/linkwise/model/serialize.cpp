@@ -47,7 +47,7 @@ struct Reader {
   /// An enumeration of n values, or a truth value: anything else would be read out of bounds later.
   template <class E>
   void choice(E& value, int n) {
-    std::conditional_t<std::is_enum_v<E>, int, unsigned char> x{};
+    std::conditional_t<sizeof(E) == 1, unsigned char, int> x{};
     static_assert(sizeof(x) == sizeof(E));
     raw(&x, sizeof(x));
     if (x < 0 || x >= n) fail("damaged");
@@ -116,13 +116,22 @@ void spec_fields(A& archive, Spec& spec) {
     text(archive, n.element);
     text(archive, n.text);
   }
-  // Left out where no joint has any, so that machines without are described as they always were.
+  // Each of these is left out where nothing follows that is not as usual, so that other machines
+  // are described as they always were.
+  const bool kinds = std::any_of(spec.links.begin(), spec.links.end(),
+                                 [](const LinkSpec& l) { return l.body_kind != BodyKind::rigid; });
   const bool starts = std::any_of(spec.joints.begin(), spec.joints.end(),
                                   [](const JointSpec& j) { return !j.initial.empty(); });
-  if (!archive.goes_on(starts)) return;
+  if (!archive.goes_on(starts || kinds)) return;
   for (auto& j : spec.joints) {
     archive.size(j.initial);
     archive.raw(j.initial.data(), j.initial.size() * sizeof(double));
+  }
+  if (!archive.goes_on(kinds)) return;
+  for (auto& l : spec.links) {
+    archive.choice(l.body_kind, BodyKinds::size);
+    archive.size(l.parameters);
+    archive.raw(l.parameters.data(), l.parameters.size() * sizeof(double));
   }
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "linkwise/spatial/motion.hpp"
+#include "linkwise/bodies/body_kinds.hpp"
 
 namespace linkwise {
 
@@ -39,6 +39,8 @@ struct LinkSpec {
   double mass = 0;       ///< kg
   Vec3<double> com;      ///< centre of mass in the link frame, m
   Sym3<double> inertia;  ///< about the centre of mass, link axes, kg m^2
+  BodyKind body_kind = BodyKind::rigid;
+  std::vector<double> parameters = {};  ///< of its kind, in the link frame
 };
 
 /// Properties that a joint has once per degree of freedom; one value stands for all of them.

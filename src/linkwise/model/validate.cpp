@@ -124,6 +124,14 @@ void validate_link(const LinkSpec& link, const std::string& where, std::vector<N
   for (double x : link.inertia.m)
     if (!std::isfinite(x))
       throw InputError(head + "inertia is not finite; give finite numbers in kg m2");
+  const int kind = static_cast<int>(link.body_kind), n = BodyKinds::n_parameters[kind];
+  if (static_cast<int>(link.parameters.size()) != n)
+    throw InputError(head + "body kind " + BodyKinds::names[kind] + " takes " + std::to_string(n) +
+                     " parameters, not " + std::to_string(link.parameters.size()));
+  for (double x : link.parameters)
+    if (!std::isfinite(x))
+      throw InputError(head + "a parameter of body kind " + BodyKinds::names[kind] +
+                       " is not finite; give finite numbers");
   double principal[3];
   principal_moments(link.inertia, principal);
   const double scale = std::max(std::abs(principal[0]), std::abs(principal[2]));

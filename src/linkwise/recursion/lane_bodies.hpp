@@ -1,6 +1,7 @@
 #pragma once
-// Revolute bodies of different places of one machine side by side: position k of every lane's
-// piece. Their constants differ from lane to lane, unlike those of several systems of one model.
+// Rigid bodies on revolute joints, of different places of one machine side by side: position k of
+// every lane's piece. Their constants differ from lane to lane, unlike those of several systems of
+// one model.
 #include <vector>
 
 #include "linkwise/joints/axis_joints.hpp"
@@ -47,7 +48,7 @@ template <class S>
 struct LaneBody {
   HingePlacement<S> placement;
   S theta;
-  Inertia<S> inertia;
+  RigidBody<S> body;
   S stand_in;  ///< 1 for a massless filler beyond the end of a piece, else 0; it keeps D positive
   /// Index of its placement if some lane's joint is not a hinge, or -1.
   int skew = -1;
@@ -118,14 +119,14 @@ class LaneBodies {
     if (n < 0 || n >= model.n_bodies()) {  // turns with nothing, weighs nothing
       set_lanes<S>(to.placement, l, HingePlacement<double>{1, 0, 0, 0});
       to.theta[l] = 0;
-      set_lanes<S>(to.inertia, l, Inertia<double>{});
+      set_lanes<S>(to.body, l, RigidBody<double>{});
       to.stand_in[l] = 1;
       return;
     }
     const BodyConstants<double>& c = model.constants[n];
     set_lanes<S>(to.placement, l, placement(c));
     to.theta[l] = c.theta;
-    set_lanes<S>(to.inertia, l, c.inertia);
+    set_lanes<S>(to.body, l, c.rigid);
     to.stand_in[l] = 0;
   }
 

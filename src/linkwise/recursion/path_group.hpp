@@ -104,7 +104,7 @@ class PathGroup {
       s.tau = gather(in.tau, index_[k].v);
       v = outward_velocity<RevoluteJoint>(bodies_.place(k, s.turn), v, 0.0, s.rate);
       store(s.velocity, v);
-      s.bias = momentum_bias(bodies_[k].inertia, v);
+      s.bias = momentum_bias(bodies_[k].body, v);
     }
   }
 
@@ -118,7 +118,7 @@ class PathGroup {
     size_t branch = 0, outer = 0;
     for (int k = 0; k < length(); ++k) {
       State& s = state_[k];
-      add_inertia(Y, bodies_[k].inertia);
+      add_inertia(Y, bodies_[k].body);
       p += s.bias;
       if (is_at(branches_, branch, k) || is_at(outer_parents_, outer, k)) {
         Contribution<S> sum{};

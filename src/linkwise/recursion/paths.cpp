@@ -11,7 +11,8 @@ Paths::Paths(const Model& model) {
   std::vector<Zone> zone(n_bodies);
   for (int n = 0; n < n_bodies; ++n) {
     const BodyTopology& at = model.topology[n];
-    const bool turns = at.joint_kind == JointKind::hinge || at.joint_kind == JointKind::revolute;
+    const bool turns = at.body_kind == BodyKind::rigid &&
+                       (at.joint_kind == JointKind::hinge || at.joint_kind == JointKind::revolute);
     const Zone inboard = at.parent < 0 ? Zone::inboard : zone[at.parent];
     zone[n] = inboard == Zone::outboard  ? Zone::outboard
               : turns                    ? Zone::paths

@@ -82,7 +82,7 @@ class PieceGroup {
       State& s = state_[k];
       if (k > 0) v = outward_velocity<RevoluteJoint>(bodies_.place(k, s.turn), v, 0.0, s.rate);
       s.velocity = v;
-      s.bias = momentum_bias(bodies_[k].inertia, v);
+      s.bias = momentum_bias(bodies_[k].body, v);
     }
   }
 
@@ -98,7 +98,7 @@ class PieceGroup {
     bool positive = true;
     for (int k = length() - 1; k >= 0; --k) {
       State& s = state_[k];
-      add_inertia(Y, bodies_[k].inertia);
+      add_inertia(Y, bodies_[k].body);
       p += s.bias;
       if (k == 0) break;
       EliminatedAxis<S> axis;
@@ -148,7 +148,7 @@ class PieceGroup {
                     f.outboard[j] * ends.cut_columns[j].ang};
     for (int k = length() - 1; k >= 0; --k) {
       State& s = state_[k];
-      inward_load(bodies_[k].inertia, s.acceleration, s.bias, w);
+      inward_load(bodies_[k].body, s.acceleration, s.bias, w);
       s.joint_load = w;
       if (k > 0) w = bodies_.place(k, s.turn).to_parent(w);
     }

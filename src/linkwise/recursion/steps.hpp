@@ -203,7 +203,7 @@ struct CutTorque {
 template <class Body, class S>
 LW_INLINE void inward_load(const Body& body, const Motion<S>& a, const Force<S>& bias,
                            Force<S>& w) {
-  w += momentum(body, a);
+  w += inertia_times(body, a);
   w += bias;
 }
 

@@ -81,7 +81,7 @@ class TreeSweeps {
   template <bool again = false>
   void calc_velocities(const SweepInput<S>& in, const Ranges& ranges) {
     const auto velocity_of = [&](int n) -> const Motion<S>& { return body_[n].velocity; };
-    const auto step = [&](auto joint, int n, const Motion<S>& v_parent) {
+    const auto step = [&](auto joint, int n, const auto& own, const Motion<S>& v_parent) {
       using J = decltype(joint);
       const BodyTopology& at = model_.topology[n];
       const BodyConstants<double>& k = model_.constants[n];
@@ -93,9 +93,9 @@ class TreeSweeps {
         store(b.velocity,
               outward_velocity<J>(place<J>(n), v_parent, k.pitch, in.v ? in.v[at.v] : S{}));
       }
-      b.sum.p = momentum_bias(k.inertia, b.velocity);
+      b.sum.p = momentum_bias(own, b.velocity);
     };
-    sweep_outward(model_, ranges, Motion<S>{}, velocity_of, step);
+    sweep_bodies_outward(model_, ranges, Motion<S>{}, velocity_of, step);
   }
 
   /// What calc_velocities<true>() gives for a machine at rest.
@@ -121,14 +121,14 @@ class TreeSweeps {
 
   /// Tip to base: eliminates the joints. Everything outboard of the ranges has contributed.
   void eliminate_joints(const SweepInput<S>& in, const Ranges& ranges, bool with_loads) {
-    for_bodies_tip_to_base(ranges, [&](auto joint, int n) {
+    for_bodies_tip_to_base(model_, ranges, [&](auto joint, int n, const auto& own) {
       using J = decltype(joint);
       const BodyTopology& at = model_.topology[n];
       const BodyConstants<double>& k = model_.constants[n];
       Body& b = body_[n];
       ArticulatedInertia<S> Y{};
       if (at.n_children > 0) Y = b.sum.Y;
-      add_inertia(Y, k.inertia);
+      add_inertia(Y, own);
       if constexpr (is_general<J>) {
         eliminate_stack(in, n, Y, with_loads);
       } else {

@@ -57,7 +57,7 @@ StackedSystem stacked_system(const Model& model, const SweepInput<double>& in) {
     for (int r = 0; r < 6; ++r) unit[r][r] = 1;
     set_block(G, i, i, unit);
     if (body.parent >= 0) set_block(G, i, body.parent, dense(states[i].X), -1);
-    set_block(W, i, i, inverted(dense(model.constants[i].inertia)));
+    set_block(W, i, i, inverted(dense(model.constants[i].rigid.inertia)));
     Motion<double> given = states[i].c;
     if (body.parent < 0) given += states[i].X * ground;
 

@@ -193,7 +193,7 @@ TEST(Paths, NamesTheBodyWhosePivotFails) {
   Draws draws(8);
   ModelSpec spec = tree_spec(tree.types, tree.parents, draws);
   Model model(spec);
-  model.constants[7].inertia.I = {{-1e3, 0, -1e3, 0, 0, -1e3}};
+  model.constants[7].rigid.inertia.I = {{-1e3, 0, -1e3, 0, 0, -1e3}};
   ArticulatedPaths<Lanes<4>> paths(model);
   ArticulatedBody<double> body_by_body(model);
   const DynamicsCase c(model, 5);

@@ -21,7 +21,7 @@ struct PointCloud {
 };
 
 template <class S>
-Force<S> momentum(const PointCloud& body, const Motion<S>& v) {
+Force<S> inertia_times(const PointCloud& body, const Motion<S>& v) {
   Force<S> h{};
   for (const auto& p : body.points) {
     const Vec3<S> moved = p.mass * (v.lin + cross(v.ang, p.at));
@@ -32,7 +32,7 @@ Force<S> momentum(const PointCloud& body, const Motion<S>& v) {
 
 template <class S>
 Force<S> momentum_bias(const PointCloud& body, const Motion<S>& v) {
-  return cross_dual(v, momentum(body, v));
+  return cross_dual(v, inertia_times(body, v));
 }
 
 template <class S>
@@ -121,7 +121,7 @@ TEST(Steps, TakeAnyBodyThatAnswersThem) {
   Chain<PointCloud> clouds{model, {}};
   for (int n = 0; n < n_bodies; ++n) {
     clouds.bodies.push_back(random_cloud(draws));
-    model.constants[n].inertia = rigid(clouds.bodies[n]);
+    model.constants[n].rigid = {rigid(clouds.bodies[n])};
   }
   const MachineState state = random_state(model, draws);
   const std::vector<double> tau = random_values(n_bodies, draws, 5);

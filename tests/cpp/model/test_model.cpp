@@ -40,7 +40,7 @@ TEST(LightLinks, FixedLinksMergeIntoTheirParents) {
   // The ground is no part of what moves.
   const double moving = spec.links[2].mass + spec.links[3].mass + spec.links[4].mass;
   EXPECT_DOUBLE_EQ(model.total_mass(), moving);
-  EXPECT_DOUBLE_EQ(model.constants[0].inertia.m, moving);
+  EXPECT_DOUBLE_EQ(mass(model.constants[0].rigid), moving);
   ModelSpec floating = spec;
   floating.floating_base = true;
   EXPECT_NEAR(Model(floating).total_mass(), moving + spec.links[0].mass + spec.links[1].mass,
