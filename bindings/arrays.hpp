@@ -130,9 +130,9 @@ class ArrayIn {
  public:
   ArrayIn() = default;
 
-  /// False for anything else.
+  /// False for anything else, kinds of arrays that may hide something (masks) included.
   bool open(nb::handle value) {
-    if (!PyObject_TypeCheck(value.ptr(), numpy_array_type())) return false;
+    if (Py_TYPE(value.ptr()) != numpy_array_type()) return false;
     constexpr int contiguous = 0x1, aligned = 0x100;
     constexpr char foreign = std::endian::native == std::endian::little ? '>' : '<';
     const auto* found = reinterpret_cast<const NumpyArray*>(value.ptr());
@@ -158,17 +158,53 @@ class ArrayIn {
   nb::object owner_;
 };
 
+/// What an array holds that is no real number, by the kind of its dtype; null for real numbers.
+inline const char* unreal_values(char kind) {
+  switch (kind) {
+    case 'f':
+    case 'i':
+    case 'u':
+      return nullptr;
+    case 'b':
+      return "truth values";
+    case 'c':
+      return "complex numbers";
+    case 'm':
+    case 'M':
+      return "times or dates";
+    case 'S':
+    case 'U':
+    case 'T':
+      return "text";
+    case 'V':
+      return "records";
+    default:
+      return "objects";
+  }
+}
+
+/// `value` as an array of float64. Whatever else NumPy would turn into numbers is refused: it would
+/// drop imaginary parts and masks, and read texts and dates.
 inline ArrayIn as_array(nb::handle value, const char* name) {
   ArrayIn array;
   if (array.open(value)) return array;
+  const char* found = nullptr;
   try {
-    const nb::object converted =
-        numpy("array")(value, "dtype"_a = numpy("float64"), "order"_a = "C");
-    if (array.open(converted)) return array;
+    const nb::object given = numpy("asarray")(value);
+    if (PyObject_TypeCheck(value.ptr(), numpy_array_type()) &&
+        nb::cast<bool>(numpy("ma").attr("is_masked")(value)))
+      found = "masked values";
+    else
+      found = unreal_values(reinterpret_cast<const NumpyArray*>(given.ptr())->descr->kind);
+    if (!found && array.open(numpy("array")(given, "dtype"_a = numpy("float64"), "order"_a = "C")))
+      return array;
   } catch (nb::python_error& error) {
     if (error.matches(PyExc_MemoryError)) throw;
   }
-  throw InputError(std::string(name) + " is not an array of numbers; give a float64 array");
+  throw InputError(
+      std::string(name) +
+      (found ? " holds " + std::string(found) : std::string(" is not an array of numbers")) +
+      "; give a float64 array");
 }
 
 inline Shape shape_of(const ArrayIn& array) {

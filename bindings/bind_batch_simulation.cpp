@@ -23,7 +23,7 @@ const double* rows_of(const Argument& argument, size_t members) {
 }
 
 nb::tuple simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, nb::handle tau,
-                           nb::handle times_in, nb::handle quantities, std::optional<int> threads) {
+                           nb::handle times_in, nb::handle quantities, nb::handle threads) {
   std::vector<const Simulation*> all;
   for (nb::handle item : simulations) all.push_back(&nb::cast<PySimulation&>(item).simulation);
   if (all.empty()) throw InputError("there is no model; give at least one");
@@ -37,7 +37,7 @@ nb::tuple simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, n
                      " simulations; give each simulation the same number of rows");
   const Start start{rows_of(q, members), rows_of(v, members), rows_of(torque, members), members};
   const Columns columns(m, {members, n}, quantities);
-  const Executor executor = executor_for(threads);
+  const Executor executor = executor_for(whole_number(threads, "threads"));
   Interrupt interrupt;
   std::vector<Ending> endings;
   {

@@ -5,6 +5,7 @@
 
 #include "bind.hpp"
 #include "linkwise/model/builder.hpp"
+#include "printable.hpp"
 #include "py_model.hpp"
 #include "vectors.hpp"
 
@@ -15,7 +16,7 @@ AxisSpec axis_spec(nb::handle item) {
   const bool is_sequence = nb::isinstance<nb::tuple>(item) || nb::isinstance<nb::list>(item);
   if (is_sequence && nb::len(item) > 0 && nb::isinstance<nb::str>(item[0]))
     return make_axis(nb::cast<std::string>(nb::object(item[0])), vec3(item[1], "axis"),
-                     nb::len(item) > 2 ? nb::cast<double>(nb::object(item[2])) : 0);
+                     nb::len(item) > 2 ? real_number(item[2], "pitch") : 0);
   return {AxisKind::revolute, vec3(item, "axis"), 0};
 }
 
@@ -91,7 +92,8 @@ void bind_note(nb::module_& m) {
              const auto& [level, element, text] = state;
              new (&n) Note{static_cast<NoteLevel>(level), element, text};
            })
-      .def("__repr__", [](const Note& n) { return "Note(" + n.element + ": " + n.text + ")"; });
+      .def("__repr__",
+           [](const Note& n) { return printable("Note(" + n.element + ": " + n.text + ")"); });
 }
 
 void bind_chain(nb::module_& m) {

@@ -12,11 +12,11 @@ namespace {
 
 nb::object loads_by_cause(const PyModel& self, const std::vector<std::string>& names, nb::handle q,
                           nb::handle v, nb::handle tau, nb::handle external, nb::handle prescribed,
-                          const std::string& method, std::optional<int> threads) {
+                          const std::string& method, nb::handle threads) {
   const Model& m = *self.model;
   const std::vector<Cause> causes = causes_from_names(names);
   const States s(m, q, v, tau, "tau", external, prescribed);
-  const Executor executor = executor_for(threads, s.count * m.n_bodies());
+  const Executor executor = executor_for(whole_number(threads, "threads"), s.count * m.n_bodies());
   NewArray loads(s.lead, {causes.size(), size(m.n_joints()), 6});
   const EvaluationReport report = without_gil([&](const GoOn& go_on) {
     return self.evaluator.loads_by_cause(s.count, s.input(), causes, method, executor, loads.data,

@@ -6,6 +6,7 @@
 #include "bind.hpp"
 #include "linkwise/integrate/integrator.hpp"
 #include "linkwise/solve/registry.hpp"
+#include "printable.hpp"
 #include "report.hpp"
 #include "solver_options.hpp"
 #include "states.hpp"
@@ -30,9 +31,9 @@ DynamicsOptions options_of(const std::string& method, const std::string& solver,
   options.method = method;
   options.solver = solver;
   SolverOptions& o = options.solver_options;
-  if (!tolerance.is_none()) o.tolerance = nb::cast<double>(tolerance);
+  if (!tolerance.is_none()) o.tolerance = real_number(tolerance, "tolerance");
   if (!stop.is_none()) o.stop = stop_rule_from_name(nb::cast<std::string>(stop));
-  if (!max_iterations.is_none()) o.max_iterations = nb::cast<int>(max_iterations);
+  if (const auto most = whole_number(max_iterations, "max_iterations")) o.max_iterations = *most;
   read_solver_options(solver_options, options);
   return options;
 }
@@ -45,10 +46,10 @@ void check_room(const Model& m, const States& s, bool passive, bool with_loads) 
 }
 
 nb::object forward_dynamics(const PyModel& self, const States& s, bool passive, double gravity,
-                            DynamicsOptions options, std::optional<int> threads, Wanted wanted) {
+                            DynamicsOptions options, nb::handle threads, Wanted wanted) {
   const Model& m = *self.model;
   const bool full = wanted == Wanted::full, with_loads = wanted != Wanted::accelerations;
-  options.executor = executor_for(threads, s.count * m.n_bodies());
+  options.executor = executor_for(whole_number(threads, "threads"), s.count * m.n_bodies());
   BatchInput in = s.input();
   in.passive_acts = passive;
   in.gravity_factor = gravity;
@@ -75,11 +76,10 @@ nb::object forward_dynamics(const PyModel& self, const States& s, bool passive, 
 }
 
 nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle a,
-                            nb::handle external, double gravity, std::optional<int> threads,
-                            bool loads) {
+                            nb::handle external, double gravity, nb::handle threads, bool loads) {
   const Model& m = *self.model;
   const States s(m, q, v, a, "acceleration", external);
-  const Executor executor = executor_for(threads, s.count * m.n_bodies());
+  const Executor executor = executor_for(whole_number(threads, "threads"), s.count * m.n_bodies());
   NewArray out(s.lead, loads ? Shape{size(m.n_joints()), 6} : Shape{size(m.nv())});
   BatchInput in = s.input();
   std::swap(in.tau, in.du);
@@ -93,7 +93,7 @@ nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
 
 nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
                        nb::handle external, bool passive, const std::string& method,
-                       const std::string& solver, std::optional<int> threads) {
+                       const std::string& solver, nb::handle threads) {
   return forward_dynamics(
       self, States(*self.model, q, v, tau, "tau", external), passive, 1.0,
       options_of(method, solver, nb::none(), nb::none(), nb::none(), nb::none()), threads,
@@ -172,6 +172,15 @@ void bind_results(nb::module_& m) {
   numerics_error.attr("__module__") = "linkwise";
   numerics_error.attr("__doc__") =
       "A computation failed: one line with the method, the body and the remedy.";
+  nb::register_exception_translator(
+      [](const std::exception_ptr& thrown, void* type) {
+        try {
+          std::rethrow_exception(thrown);
+        } catch (const NumericsError& error) {
+          raise_printable(static_cast<PyObject*>(type), error.what());
+        }
+      },
+      numerics_error.ptr());
   nb::class_<PyReport>(m, "Report", "How an evaluation went.")
       .def_prop_ro(
           "outcome", [](const PyReport& r) { return std::string(to_string(r.outcome)); },
@@ -221,8 +230,8 @@ void bind_forward(nb::module_& m) {
       "forward_dynamics",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
          bool passive, const std::string& method, const std::string& solver, nb::handle tolerance,
-         nb::handle stop, nb::handle max_iterations, nb::handle solver_options,
-         std::optional<int> threads, bool full, double gravity, nb::handle prescribed) {
+         nb::handle stop, nb::handle max_iterations, nb::handle solver_options, nb::handle threads,
+         bool full, double gravity, nb::handle prescribed) {
         return forward_dynamics(
             self, States(*self.model, q, v, tau, "tau", external, prescribed), passive, gravity,
             options_of(method, solver, tolerance, stop, max_iterations, solver_options), threads,
@@ -263,7 +272,7 @@ void bind_inverse(nb::module_& m) {
   m.def(
       "inverse_dynamics",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
-         double gravity, std::optional<int> threads) {
+         double gravity, nb::handle threads) {
         return inverse_dynamics(self, q, v, a, external, gravity, threads, false);
       },
       "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
@@ -288,7 +297,7 @@ Raises:
   m.def(
       "inverse_dynamics_loads",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
-         double gravity, std::optional<int> threads) {
+         double gravity, nb::handle threads) {
         return inverse_dynamics(self, q, v, a, external, gravity, threads, true);
       },
       "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),

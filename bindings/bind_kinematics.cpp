@@ -15,13 +15,13 @@ namespace {
 /// f(model, q, v, out) for every state, over threads; out has `tail` numbers. v is zero where it
 /// is None.
 template <class F>
-nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads,
+nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handle threads,
                       const Shape& tail, F&& f) {
   const Model& m = *self.model;
   States s(m, q, v, nb::none(), "tau", nb::none());
   NewArray out(s.lead, tail);
   const size_t n = product(tail);
-  const Executor executor = executor_for(threads, s.count * m.n_bodies());
+  const Executor executor = executor_for(whole_number(threads, "threads"), s.count * m.n_bodies());
   const std::vector<double> zero(m.nv());
   without_gil([&](const GoOn& go_on) {
     for_each_part(m, s.count, executor, go_on, [&](size_t first, size_t count) {
@@ -36,10 +36,11 @@ nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, std::opti
 void bind_forces(nb::module_& m) {
   m.def(
       "mass_matrix",
-      [](const PyModel& self, nb::handle q, std::optional<int> threads) {
+      [](const PyModel& self, nb::handle q, nb::handle threads) {
         const size_t nv = self.model->nv();
         const States s(*self.model, q, nb::none(), nb::none(), "tau", nb::none());
-        const Executor executor = executor_for(threads, s.count * self.model->n_bodies());
+        const Executor executor =
+            executor_for(whole_number(threads, "threads"), s.count * self.model->n_bodies());
         NewArray H(s.lead, {nv, nv});
         without_gil([&](const GoOn& go_on) {
           self.evaluator.mass_matrix(s.count, s.q.data, executor, H.data, go_on);
@@ -62,7 +63,7 @@ Raises:
     InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "passive_torque",
-      [](const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads) {
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
         return map_states(self, q, v, threads, {size(self.model->nv())},
                           [](const Model& m, const double* q, const double* v, double* out) {
                             std::fill(out, out + m.nv(), 0.0);
@@ -87,7 +88,7 @@ Raises:
 void bind_energies(nb::module_& m) {
   m.def(
       "kinetic_energy",
-      [](const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads) {
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
         return map_states(self, q, v, threads, {},
                           [](const Model& m, const double* q, const double* v, double* out) {
                             *out = kinetic_energy(m, q, v);
@@ -108,7 +109,7 @@ Raises:
     InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "potential_energy",
-      [](const PyModel& self, nb::handle q, std::optional<int> threads) {
+      [](const PyModel& self, nb::handle q, nb::handle threads) {
         return map_states(self, q, nb::none(), threads, {},
                           [](const Model& m, const double* q, const double*, double* out) {
                             *out = potential_energy(m, q);
@@ -129,7 +130,7 @@ Raises:
     InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "momentum",
-      [](const PyModel& self, nb::handle q, nb::handle v, std::optional<int> threads) {
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
         return map_states(self, q, v, threads, {6},
                           [](const Model& m, const double* q, const double* v, double* out) {
                             momentum(m, q, v, out);
@@ -161,7 +162,7 @@ int joint_of(const PyModel& self, nb::handle body) {
                        "' is welded and has no frame of its own; name the body that carries "
                        "it (Model.notes)");
   } else {
-    joint = nb::cast<int>(body);
+    joint = whole_number(body, "body").value_or(0);
     if (joint < 0 || joint >= self.model->n_joints())
       throw InputError("body index " + std::to_string(joint) + " is out of range; the model has " +
                        std::to_string(self.model->n_joints()) + " bodies");
@@ -172,7 +173,7 @@ int joint_of(const PyModel& self, nb::handle body) {
 void bind_poses(nb::module_& m) {
   m.def(
       "joint_poses",
-      [](const PyModel& self, nb::handle q, std::optional<int> threads) {
+      [](const PyModel& self, nb::handle q, nb::handle threads) {
         return map_states(self, q, nb::none(), threads, {size(self.model->n_joints()), 4, 4},
                           [](const Model& m, const double* q, const double*, double* out) {
                             joint_poses(m, q, out);
@@ -193,7 +194,7 @@ Raises:
     InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "link_poses",
-      [](const PyModel& self, nb::handle q, std::optional<int> threads) {
+      [](const PyModel& self, nb::handle q, nb::handle threads) {
         return map_states(self, q, nb::none(), threads, {self.model->links.size(), 4, 4},
                           [](const Model& m, const double* q, const double*, double* out) {
                             link_poses(m, q, out);
@@ -215,7 +216,7 @@ Raises:
     InputError: shapes do not fit the model, or a number is not finite.)");
   m.def(
       "body_jacobian",
-      [](const PyModel& self, nb::handle q, nb::handle body, std::optional<int> threads) {
+      [](const PyModel& self, nb::handle q, nb::handle body, nb::handle threads) {
         const int joint = joint_of(self, body);
         return map_states(self, q, nb::none(), threads, {6, size(self.model->nv())},
                           [joint](const Model& m, const double* q, const double*, double* out) {

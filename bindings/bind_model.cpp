@@ -5,6 +5,7 @@
 
 #include "bind.hpp"
 #include "linkwise/model/builder.hpp"
+#include "printable.hpp"
 #include "py_model.hpp"
 #include "vectors.hpp"
 
@@ -48,7 +49,7 @@ PyModel* with_link(const PyModel& self, const std::string& link, nb::handle mass
   ModelSpec spec = self.model->spec();
   LinkSpec& old = spec.links[self.model->link_index(link)];
   LinkSpec given =
-      link_spec(link, mass.is_none() ? old.mass : nb::cast<double>(mass), com, inertia);
+      link_spec(link, mass.is_none() ? old.mass : real_number(mass, "mass"), com, inertia);
   if (com.is_none()) given.com = old.com;
   if (inertia.is_none()) given.inertia = old.inertia;
   given.body_kind = old.body_kind;
@@ -154,7 +155,7 @@ void bind_sizes(ModelClass& c) {
           "Positions q (nq,) [rad, m] where simulations start unless told otherwise: as the file "
           "draws the machine, which is the zero position but for the free bodies of an MJCF.")
       .def("__repr__", [](const PyModel& s) {
-        return "<linkwise.Model '" + s.model->spec().name +
+        return "<linkwise.Model '" + printable(s.model->spec().name) +
                "': " + std::to_string(s.model->n_joints()) + " joints, nq " +
                std::to_string(s.model->nq()) + ", nv " + std::to_string(s.model->nv()) + ">";
       });

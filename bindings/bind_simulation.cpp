@@ -5,6 +5,7 @@
 #include "bind.hpp"
 #include "interrupt.hpp"
 #include "linkwise/simulate/numerics.hpp"
+#include "numbers.hpp"
 #include "py_simulation.hpp"
 #include "samples.hpp"
 #include "solver_options.hpp"
@@ -65,7 +66,7 @@ SimulationOptions options_of(const nb::kwargs& given) {
     if (name == "solver_options") {
       solver_options = nb::borrow(value);
     } else if (name == "threads") {
-      threads = nb::cast<std::optional<int>>(value);
+      threads = whole_number(value, "threads");
     } else {
       std::visit(
           [&, value = value](auto member) {

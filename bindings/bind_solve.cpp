@@ -16,6 +16,7 @@
 #include "linkwise/forces/passive.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "linkwise/solve/spectrum.hpp"
+#include "numbers.hpp"
 #include "py_model.hpp"
 #include "report.hpp"
 #include "solver_options.hpp"
@@ -464,9 +465,9 @@ many as needed.)")
 void make_method(PyDynamicsMethod* self, const PyModel& model, const std::string& method,
                  const std::string& solver, const std::string& guess, double tolerance,
                  const std::string& stop, int max_iterations, nb::handle solver_options,
-                 std::optional<int> threads) {
+                 nb::handle threads) {
   DynamicsOptions options;
-  options.executor = executor_for(threads);
+  options.executor = executor_for(whole_number(threads, "threads"));
   options.method = method;
   options.solver = solver;
   options.initial_guess = guess;

@@ -1,9 +1,12 @@
 #include <nanobind/nanobind.h>
 
+#include "arrays.hpp"
 #include "bind.hpp"
 #include "linkwise/base/error.hpp"
+#include "printable.hpp"
 
 namespace nb = nanobind;
+using namespace nanobind::literals;
 
 NB_MODULE(LINKWISE_MODULE_NAME, m) {
   // Classes say that they live in linkwise._core, which re-exports this module: a pickled model
@@ -17,6 +20,26 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
   input_error.attr("__module__") = "linkwise";
   input_error.attr("__doc__") =
       "What was given cannot be used: one line with the element and the remedy.";
+  nb::register_exception_translator(
+      [](const std::exception_ptr& thrown, void* type) {
+        try {
+          std::rethrow_exception(thrown);
+        } catch (const linkwise::InputError& error) {
+          linkwise::bindings::raise_printable(static_cast<PyObject*>(type), error.what());
+        }
+      },
+      input_error.ptr());
+  m.def(
+      "as_floats",
+      [](nb::handle values, const std::string& name) {
+        return linkwise::bindings::as_array(values, name.c_str()).object();
+      },
+      "values"_a, "name"_a,
+      R"(The values as a float64 array, C-contiguous: the same one where it is one already.
+
+Raises:
+    InputError: complex numbers, truth values, text, dates, records, objects, masked values. NumPy
+        would turn most of them into numbers without a word.)");
   linkwise::bindings::bind_builder(m);
   linkwise::bindings::bind_model(m);
   linkwise::bindings::bind_dynamics(m);

@@ -1,7 +1,7 @@
 #pragma once
 // States of a model with leading axes, and the work on them over threads.
-#include "arrays.hpp"
 #include "interrupt.hpp"
+#include "numbers.hpp"
 #include "py_model.hpp"
 
 namespace linkwise::bindings {

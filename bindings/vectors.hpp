@@ -1,8 +1,8 @@
 #pragma once
 // Vectors and matrices of three from Python.
-#include "arrays.hpp"
 #include "linkwise/model/spec.hpp"
 #include "linkwise/spatial/vec3.hpp"
+#include "numbers.hpp"
 
 namespace linkwise::bindings {
 

@@ -44,6 +44,7 @@ PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "simulations": "Sequence[Simulation]",
     "solver_options": "Mapping[str, Any]",
     "source": "str",
+    "threads": "int",
     "stop": "str",
     "tolerance": "float",
     "properties": "Any",

@@ -139,7 +139,7 @@ def test_whatever_numpy_can_turn_into_numbers(given):
 @pytest.mark.parametrize("given", ["abc", object(), [[1, 2], [3]], 1j])
 def test_what_is_no_array_of_numbers(given):
     model = lw.scenes.chain(3)
-    with pytest.raises(ValueError, match="q is not an array of numbers; give a float64 array"):
+    with pytest.raises(ValueError, match=r"^q (is not|holds) .*; give a float64 array$"):
         lw.forward_dynamics(model, given, np.zeros(3))
 
 

@@ -114,7 +114,7 @@ def test_table_from_csv(tmp_path):
     ("make", "message"),
     [
         (lambda: Torque(float("nan")), "torque: not finite; give finite numbers in SI units"),
-        (lambda: Torque("3"), "torque: not numbers; give numbers in SI units"),
+        (lambda: Torque("3"), "torque holds text; give a float64 array"),
         (lambda: PD(-1, 0), "pd kp: is negative (-1); give a value >= 0"),
         (lambda: PD(1, math.inf), "pd kd: not finite; give finite numbers in SI units"),
         (lambda: PD([1, 2], 0), "pd kp: has shape (2,); give one number"),

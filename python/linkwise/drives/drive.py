@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from linkwise._core import InputError
+from linkwise._core import InputError, as_floats
 from linkwise.base import Array
 from linkwise.drives.jumps import LEAST_ROWS, NAMES, find_jump
 from linkwise.io.table import read_table
@@ -23,13 +23,7 @@ Frame = Literal["world", "body"]
 
 
 def _finite(value: npt.ArrayLike, what: str) -> Array:
-    try:
-        given = np.asarray(value)
-    except (TypeError, ValueError):  # lists of unequal lengths
-        given = np.empty(0, dtype=object)
-    if given.dtype.kind not in "iuf":  # NumPy itself would turn texts and truth values into numbers
-        raise InputError(f"{what}: not numbers; give numbers in SI units")
-    array = given.astype(np.float64)  # a copy: the caller's array may change later
+    array = np.array(as_floats(value, what))  # a copy: the caller's array may change later
     if not np.isfinite(array).all():
         raise InputError(f"{what}: not finite; give finite numbers in SI units")
     return array

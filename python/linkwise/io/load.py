@@ -10,7 +10,7 @@ from typing import get_args
 import numpy as np
 import numpy.typing as npt
 
-from linkwise._core import Model
+from linkwise._core import InputError, Model, as_floats
 from linkwise.io.complaint import complain, shorten
 from linkwise.io.encoding import decode_xml
 from linkwise.io.files import MODEL_BYTES, read_bytes
@@ -128,8 +128,8 @@ def _check_choice(
 
 def _gravity(path: str | os.PathLike[str], gravity: npt.ArrayLike) -> tuple[float, float, float]:
     try:
-        vector = np.asarray(gravity, dtype=float)
-    except (TypeError, ValueError):
+        vector = as_floats(gravity, "gravity")
+    except InputError:
         vector = np.empty(0)
     if vector.shape != (3,) or not np.isfinite(vector).all():
         complain(path, "gravity", "is not a vector of 3 finite numbers", "give (0, 0, -9.81)")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from linkwise._core import InputError
+from linkwise._core import InputError, as_floats
 from linkwise.base import Array
 from linkwise.io.complaint import near, shorten
 from linkwise.io.mjcf import KINDS, Names, compile_mjcf, keyframe_names, rotation
@@ -156,7 +156,7 @@ def _joints(mj_model: Any) -> Iterator[tuple[str, str, slice, slice]]:
 
 
 def _vector(values: npt.ArrayLike, size: int, name: str) -> Array:
-    array = np.asarray(values, dtype=float)
+    array = as_floats(values, name)
     if array.shape != (size,):
         raise InputError(f"{name}: expected shape ({size},), given shape {array.shape}")
     return array

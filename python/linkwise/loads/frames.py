@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise import _core
-from linkwise._core import InputError
+from linkwise._core import InputError, as_floats
 from linkwise.base import Array
 from linkwise.loads.samples import joint_names, model_of, need_whole, rows
 
@@ -81,7 +81,7 @@ def in_frame(
     where = "joint point: the origin of the joint frame"
     world = _turned(load, child[..., :3, :3])
     if point is not None:
-        given = np.asarray(point, dtype=np.float64)
+        given = as_floats(point, "point")
         if given.shape not in ((3,), (machine.n_joints, 3)) or not np.isfinite(given).all():
             raise InputError(
                 f"point: shape {given.shape}; give three finite coordinates in metres, or one row "

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from linkwise._core import InputError, make_chain, require_memory
+from linkwise._core import InputError, as_floats, make_chain, require_memory
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -32,10 +32,7 @@ def check_rod(length: float, mass: float, radius: float) -> None:
 def joint_axes(axes: str | ArrayLike, n: int, seed: int) -> np.ndarray:
     """Axes (k, 3), used in turn: a pattern by name, or the axes themselves."""
     if not isinstance(axes, str):
-        try:
-            return np.atleast_2d(np.asarray(axes, dtype=float))
-        except (TypeError, ValueError):
-            raise InputError("axes: are not numbers; give an array (k, 3)") from None
+        return np.atleast_2d(as_floats(axes, "axes"))
     if axes == "alternating":
         return np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
     if axes == "parallel":

@@ -10,7 +10,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from linkwise._core import InputError
+from linkwise._core import InputError, as_floats
 
 _DEFAULT_SAMPLES = 1000
 _MAX_SAMPLES = 100_000_000
@@ -53,10 +53,10 @@ def options_object(argument: str, kind: type[T], given: T | Mapping[str, Any] | 
 
 def number(name: str, value: Any) -> float:
     """A finite number above zero, or an InputError that says which argument is wrong."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: {value!r} is not a number") from None
+    array = as_floats(value, name)
+    if array.ndim:
+        raise InputError(f"{name} has shape {array.shape}; give one number")
+    number = float(array)
     if not np.isfinite(number) or number <= 0:
         raise InputError(f"{name}: {number:g} given; give a finite number above 0")
     return number
@@ -76,10 +76,7 @@ def state_vector(
     name: str, values: Any, size: int, default: npt.ArrayLike
 ) -> npt.NDArray[np.float64]:
     """Initial q or v as a vector of `size` finite numbers."""
-    try:
-        array = np.array(default if values is None else values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected an array of {size} numbers") from None
+    array = np.array(as_floats(default if values is None else values, name))
     if array.shape != (size,):
         raise InputError(f"{name}: expected shape ({size},), given shape {array.shape}")
     if not np.all(np.isfinite(array)):
@@ -118,10 +115,7 @@ def _given_times(
 ) -> npt.NDArray[np.float64]:
     if every is not None:
         raise InputError("every and times: give one of them")
-    try:
-        listed = np.array(times, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("times: expected an array of numbers, in seconds") from None
+    listed = np.array(as_floats(times, "times"))
     if listed.ndim != 1 or listed.size == 0:
         raise InputError(f"times: expected shape (n,) with n > 0, given shape {listed.shape}")
     if not np.all(np.isfinite(listed)) or listed[0] < 0 or np.any(np.diff(listed) <= 0):

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise import _core
-from linkwise._core import InputError, Model
+from linkwise._core import InputError, Model, as_floats
 from linkwise.base import Array
 from linkwise.notes import tell, warning_attrs, warnings_of
 from linkwise.record.provenance import plain, provenance
@@ -39,10 +39,7 @@ def _machines(model: Model | Sequence[Model]) -> list[Model]:
 
 def _rows(name: str, values: Any, width: int) -> Array:
     """(..., width) finite numbers."""
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected an array of numbers") from None
+    array = as_floats(values, name)
     if array.ndim == 0 or array.shape[-1] != width:
         raise InputError(f"{name}: expected shape (..., {width}), given shape {array.shape}")
     if not np.isfinite(array).all():

@@ -89,3 +89,16 @@ def test_names_that_the_output_cannot_encode(tmp_path, arm, encoding):
     assert done.returncode == 0, done.stderr
     assert done.stderr == b""
     assert ("關節\u0416" if encoding == "utf-8" else "???") in done.stdout.decode(encoding)
+
+
+@pytest.mark.parametrize("character", [chr(27), chr(10), chr(127), chr(0x9B), chr(0x85)])
+def test_what_the_core_says_in_python(character):
+    model = lw.scenes.chain(1)
+    with pytest.raises(lw.InputError) as caught:
+        model.joint_index(f"a{character}b 關節")
+    assert str(caught.value).isprintable()
+    assert "關節" in str(caught.value)
+    builder = lw.ModelBuilder(f"a{character}b")
+    builder.add_link("l", mass=1, inertia=[[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    builder.set_floating_base()
+    assert repr(builder.build()).isprintable()

@@ -1,0 +1,38 @@
+#pragma once
+// What a message holds may come from a file of somebody else, and ends on a terminal.
+#include <Python.h>
+#include <string>
+#include <string_view>
+
+namespace linkwise::bindings {
+
+/// UTF-8 with its control characters written as escapes: C0, DEL and C1.
+inline std::string printable(std::string_view text) {
+  static constexpr char digits[] = "0123456789abcdef";
+  std::string shown;
+  for (size_t i = 0; i < text.size(); ++i) {
+    unsigned char c = static_cast<unsigned char>(text[i]);
+    const bool c1 = c == 0xc2 && i + 1 < text.size() &&
+                    static_cast<unsigned char>(text[i + 1]) >= 0x80 &&
+                    static_cast<unsigned char>(text[i + 1]) < 0xa0;
+    if (c1) c = static_cast<unsigned char>(text[++i]);
+    if (c1 || c < 0x20 || c == 0x7f)
+      (shown += "\\x") += {digits[c >> 4], digits[c & 15]};
+    else
+      shown += text[i];
+  }
+  return shown;
+}
+
+/// Raises a Python exception of this type with a message of the core. Bytes that are no text, which
+/// a damaged file may bring, do not hide it.
+inline void raise_printable(PyObject* type, const char* message) {
+  const std::string shown = printable(message);
+  PyObject* text =
+      PyUnicode_DecodeUTF8(shown.data(), static_cast<Py_ssize_t>(shown.size()), "backslashreplace");
+  if (!text) return;
+  PyErr_SetObject(type, text);
+  Py_DECREF(text);
+}
+
+}  // namespace linkwise::bindings
