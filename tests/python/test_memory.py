@@ -29,8 +29,8 @@ def test_results_of_a_batch():
 
 
 def test_machines_of_too_many_bodies():
-    refused(lambda: lw.scenes.chain(10**10), rf"a machine of 10000000000 bodies {NEEDS}")
-    refused(lambda: lw.scenes.tree(10**10), rf"a machine of 10000000000 bodies {NEEDS}")
+    refused(lambda: lw.scenes.chain(2 * 10**9), rf"a machine of 2000000000 bodies {NEEDS}")
+    refused(lambda: lw.scenes.tree(2 * 10**9), rf"a machine of 2000000000 bodies {NEEDS}")
 
 
 def test_recordings(tmp_path):
