@@ -307,6 +307,14 @@ struct NewArray {
   }
 };
 
+/// Whether a result holds numbers alone. Inputs were checked, but sums and products of large ones
+/// overflow.
+inline bool is_finite(const double* data, size_t n) {
+  bool finite = true;
+  for (size_t i = 0; i < n; ++i) finite &= data[i] - data[i] == 0;
+  return finite;
+}
+
 /// A vector as a new 1-D array.
 inline nb::object to_numpy(const std::vector<double>& values) {
   NewArray out({values.size()});

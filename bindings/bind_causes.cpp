@@ -23,6 +23,7 @@ nb::object loads_by_cause(const PyModel& self, const std::vector<std::string>& n
                                          go_on);
   });
   if (!report.ok()) throw NumericsError(failure_text(m, report));
+  check_result(loads.data, s.count * causes.size() * m.n_joints() * 6);
   return loads.array;
 }
 

@@ -7,6 +7,7 @@
 #include "bind.hpp"
 #include "linkwise/dynamics/quantities.hpp"
 #include "linkwise/forces/passive.hpp"
+#include "report.hpp"
 #include "states.hpp"
 
 namespace linkwise::bindings {
@@ -30,6 +31,7 @@ nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handl
           out.data + i * n);
     });
   });
+  check_result(out.data, s.count * n);
   return s.lead.empty() && tail.empty() ? nb::object(nb::float_(out.data[0])) : out.array;
 }
 

@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "arrays.hpp"
 #include "linkwise/dynamics/evaluator.hpp"
 
 namespace linkwise::bindings {
@@ -19,5 +20,14 @@ struct PyReport : EvaluationReport {
   PyReport(const Model& model, EvaluationReport report)
       : EvaluationReport(std::move(report)), body_name(body < 0 ? "" : model.body_name(body)) {}
 };
+
+/// NumericsError unless a result holds numbers alone.
+inline void check_result(const double* data, size_t n) {
+  if (!is_finite(data, n))
+    throw NumericsError(
+        "the result is not finite; check that q, v, masses and inertias are of usual size, and "
+        "that "
+        "quaternions have unit length");
+}
 
 }  // namespace linkwise::bindings

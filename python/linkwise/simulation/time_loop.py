@@ -25,6 +25,8 @@ CALL_BYTES = 32 << 20
 # An interval between samples that takes long is itself cut, into this many pieces at most.
 MOST_PIECES = 1024
 COUNTERS = ("steps", "evaluations", "iterations")
+# What ends a run where it is no number. Products of huge rates overflow in loads before rates do.
+FINITE = ("position", "velocity", "acceleration", "drive_torque", "joint_load")
 
 
 class Progress(NamedTuple):
@@ -133,6 +135,19 @@ class _Pace:
             previous = float(wanted[-1])
 
 
+def first_not_finite(chunk: Mapping[str, Any]) -> tuple[str, int] | None:
+    """The quantity and the sample that is no number first, or None."""
+    found = None
+    for name in FINITE:
+        if name not in chunk or np.isfinite(chunk[name]).all():
+            continue
+        rows = np.isfinite(chunk[name]).reshape(len(chunk["time"]), -1).all(axis=1)
+        row = int(np.argmin(rows))
+        if found is None or row < found[1]:
+            found = name, row
+    return found
+
+
 def run_time_loop(
     simulation: Simulation,
     recorder: Recorder,
@@ -153,6 +168,16 @@ def run_time_loop(
                 with interrupt.call():
                     chunk = simulation.advance(asked, schema.quantities if are_samples else ())
                 pace.adapt(clock.monotonic() - before)
+                wrong = first_not_finite(chunk)
+                if wrong is not None:
+                    name, row = wrong
+                    time = float(chunk["time"][row])
+                    recorder.append({key: values[:row] for key, values in chunk.items()})
+                    text = (
+                        f"t = {time:g} s: {name} is not finite; check masses, inertias, drives and "
+                        "the state for values that are far too large"
+                    )
+                    return Ending("not_finite", time, "", text, counters)
                 if are_samples:
                     recorder.append(chunk)
                     recorded += len(chunk["time"])
