@@ -135,10 +135,12 @@ void bind_drives(nb::class_<PySimulation>& simulation) {
   simulation.def("drive_torque", &PySimulation::torque, "joint"_a, "values"_a)
       .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a,
            "interpolation"_a = "linear")
-      .def("drive_torque_callable", &PySimulation::torque_callable, "joint"_a, "fn"_a)
+      .def("drive_torque_callable", &PySimulation::torque_callable, "joint"_a, "fn"_a,
+           "breakpoints"_a = nb::none(), "samples"_a = nb::none())
       .def("drive_motion_table", &PySimulation::motion_table, "joint"_a, "times"_a, "values"_a,
            "interpolation"_a = "cubic")
-      .def("drive_motion_callable", &PySimulation::motion_callable, "joint"_a, "fn"_a)
+      .def("drive_motion_callable", &PySimulation::motion_callable, "joint"_a, "fn"_a,
+           "breakpoints"_a = nb::none(), "samples"_a = nb::none())
       .def("drive_pd", &PySimulation::pd, "joint"_a, "kp"_a, "kd"_a, "target"_a)
       .def("drive_pd_table", &PySimulation::pd_table, "joint"_a, "kp"_a, "kd"_a, "times"_a,
            "values"_a, "interpolation"_a = "linear")
@@ -147,8 +149,8 @@ void bind_drives(nb::class_<PySimulation>& simulation) {
       .def("wrench", &PySimulation::wrench, "body"_a, "value"_a, "frame"_a = "world")
       .def("wrench_table", &PySimulation::wrench_table, "body"_a, "times"_a, "values"_a,
            "interpolation"_a = "linear", "frame"_a = "world")
-      .def("wrench_callable", &PySimulation::wrench_callable, "body"_a, "fn"_a,
-           "frame"_a = "world");
+      .def("wrench_callable", &PySimulation::wrench_callable, "body"_a, "fn"_a, "frame"_a = "world",
+           "breakpoints"_a = nb::none(), "samples"_a = nb::none());
 }
 
 }  // namespace

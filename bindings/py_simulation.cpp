@@ -1,5 +1,7 @@
 #include "py_simulation.hpp"
 
+#include <algorithm>
+
 #include <nanobind/stl/string.h>
 
 namespace linkwise::bindings {
@@ -79,6 +81,19 @@ void store(nb::handle result, const std::string& who, double* out, size_t n) {
   std::copy(values.begin(), values.end(), out);
 }
 
+/// breakpoints: times, or None; samples: (times, values of as many columns), or None.
+FunctionCourse course_of(nb::handle breakpoints, nb::handle samples, size_t columns) {
+  FunctionCourse course;
+  if (!breakpoints.is_none()) {
+    const ArrayIn times = as_array(breakpoints, "breakpoints");
+    course.breakpoints.assign(times.data(), times.data() + times.size());
+    if (!std::is_sorted(course.breakpoints.begin(), course.breakpoints.end()))
+      throw InputError("breakpoints are not increasing; sort them");
+  }
+  if (!samples.is_none()) course.sampled = make_table(samples[0], samples[1], "linear", columns);
+  return course;
+}
+
 /// Without its value yet.
 Wrench wrench_on(const Model& model, const std::string& body, const std::string& frame) {
   if (frame != "world" && frame != "body")
@@ -131,10 +146,12 @@ void PySimulation::torque_table(const std::string& name, nb::handle times, nb::h
   set(name, std::move(d));
 }
 
-void PySimulation::torque_callable(const std::string& name, nb::callable fn) {
+void PySimulation::torque_callable(const std::string& name, nb::callable fn, nb::handle breakpoints,
+                                   nb::handle samples) {
   const JointInfo& info = model->joints[model->joint_index(name)];
   Drive d;
   d.kind = DriveKind::torque_callable;
+  d.course = course_of(breakpoints, samples, width(name));
   d.callable = [fn, name, nq = info.nq, nv = info.nv](double t, const double* q, const double* v,
                                                       double* out) {
     const nb::gil_scoped_acquire acquire;
@@ -155,9 +172,11 @@ void PySimulation::motion_table(const std::string& name, nb::handle times, nb::h
   set(name, std::move(d));
 }
 
-void PySimulation::motion_callable(const std::string& name, nb::callable fn) {
+void PySimulation::motion_callable(const std::string& name, nb::callable fn, nb::handle breakpoints,
+                                   nb::handle samples) {
   Drive d;
   d.kind = DriveKind::motion;
+  d.course = course_of(breakpoints, samples, width(name));
   d.motion = [fn, name, nv = width(name)](double t, double* q, double* v, double* a) {
     const nb::gil_scoped_acquire acquire;
     const nb::object returned = fn(t);
@@ -207,8 +226,10 @@ void PySimulation::wrench_table(const std::string& body, nb::handle times, nb::h
 }
 
 void PySimulation::wrench_callable(const std::string& body, nb::callable fn,
-                                   const std::string& frame) {
+                                   const std::string& frame, nb::handle breakpoints,
+                                   nb::handle samples) {
   Wrench w = wrench_on(*model, body, frame);
+  w.course = course_of(breakpoints, samples, 6);
   w.callable = [fn, body](double t, double* out) {
     const nb::gil_scoped_acquire acquire;
     store(fn(t), "wrench returned for body '" + body + "'", out, 6);

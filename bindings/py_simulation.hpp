@@ -19,10 +19,12 @@ class PySimulation {
   void torque(const std::string& joint, nb::handle values);
   void torque_table(const std::string& joint, nb::handle times, nb::handle values,
                     const std::string& interpolation);
-  void torque_callable(const std::string& joint, nb::callable fn);
+  void torque_callable(const std::string& joint, nb::callable fn, nb::handle breakpoints,
+                       nb::handle samples);
   void motion_table(const std::string& joint, nb::handle times, nb::handle values,
                     const std::string& interpolation);
-  void motion_callable(const std::string& joint, nb::callable fn);
+  void motion_callable(const std::string& joint, nb::callable fn, nb::handle breakpoints,
+                       nb::handle samples);
   void pd(const std::string& joint, double kp, double kd, nb::handle target);
   void pd_table(const std::string& joint, double kp, double kd, nb::handle times, nb::handle values,
                 const std::string& interpolation);
@@ -31,7 +33,8 @@ class PySimulation {
   void wrench(const std::string& body, nb::handle value, const std::string& frame);
   void wrench_table(const std::string& body, nb::handle times, nb::handle values,
                     const std::string& interpolation, const std::string& frame);
-  void wrench_callable(const std::string& body, nb::callable fn, const std::string& frame);
+  void wrench_callable(const std::string& body, nb::callable fn, const std::string& frame,
+                       nb::handle breakpoints, nb::handle samples);
   void start(double t0, nb::handle q, nb::handle v);
 
  private:

@@ -29,13 +29,14 @@ TARGETS: tuple[str, ...]
 
 # Parameters that a binding takes as a Python object, by their name.
 ARRAYS = (
-    "acceleration axes axis com external f gravity guess inertia initial prescribed q q0 rotation "
-    "target tau times translation v v0 value values"
+    "acceleration axes axis breakpoints com external f gravity guess inertia initial prescribed q "
+    "q0 rotation target tau times translation v v0 value values"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "arg": "Any",  # without a name: what pickling has kept
     "axes": "Any",  # joint axes: one per direction, or none
     "body": "str | int",
+    "samples": "tuple[npt.ArrayLike, npt.ArrayLike]",
     "fn": "Callable[..., Any]",
     "mass": "float",
     "options": "Any",

@@ -93,7 +93,7 @@ def test_inside_a_users_function():
             lw.scenes.chain(3),
             times=[0.0, 1e-8, 1000.0],
             numerics={"integrator": "runge_kutta_4", "step": 1e-9},
-            drives={"joint_1": torque},
+            drives={"joint_1": lw.Torque(torque, breakpoints=())},
         )
     np.testing.assert_array_equal(caught.value.run.time, [0.0, 1e-8])
 

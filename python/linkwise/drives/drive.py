@@ -13,6 +13,16 @@ import numpy.typing as npt
 
 from linkwise._core import InputError, as_floats
 from linkwise.base import Array
+from linkwise.drives.course import (
+    Span,
+    as_breakpoints,
+    course,
+    find_turn,
+    note_on_function,
+    notes_on_span,
+    notes_on_turn,
+    wrapped_at,
+)
 from linkwise.drives.jumps import LEAST_ROWS, NAMES, find_jump
 from linkwise.io.table import read_table
 
@@ -117,6 +127,9 @@ def check_smooth(table: Table) -> None:
             "its derivatives can be checked"
         )
     for column in range(table.values.shape[1]):
+        turn = find_turn(table.times, table.values[:, column])
+        if turn is not None:
+            raise InputError(f"motion: the position {wrapped_at(turn)}")
         jump = find_jump(table.times, table.values[:, column])
         if jump is not None:
             which = f" of column {column + 1}" if table.values.shape[1] > 1 else ""
@@ -155,15 +168,33 @@ def check_derivatives(motion: Callable[[float], Any], times: Array) -> Array:
     return values[:, 0]
 
 
-def _hand_over(simulation: Any, setter: str, name: str, value: Any, **more: Any) -> None:
-    """Give the core simulation a table, a function or constants: it has a setter for each."""
+def _hand_over(
+    simulation: Any,
+    setter: str,
+    name: str,
+    value: Any,
+    known: Callable[[Callable[..., Any]], dict[str, Any]],
+    **more: Any,
+) -> None:
+    """Give the core simulation a table, a function and what is known of it, or constants: it has a
+    setter for each."""
     if isinstance(value, Table):
         set_table = getattr(simulation, f"{setter}_table")
         set_table(name, value.times, value.values, interpolation=value.interpolation, **more)
     elif callable(value):
-        getattr(simulation, f"{setter}_callable")(name, value, **more)
+        getattr(simulation, f"{setter}_callable")(name, value, **more, **known(value))
     else:
         getattr(simulation, setter)(name, value, **more)
+
+
+def _notes(value: Any, breakpoints: Any, end: float) -> list[str]:
+    if isinstance(value, Table):
+        return notes_on_span(value.times, end)
+    return [note_on_function(end)] if callable(value) and breakpoints is None else []
+
+
+def _moved_state(span: Span, change: float) -> tuple[Array, Array]:
+    return span.q + change, span.v + change
 
 
 class Drive(ABC):
@@ -172,9 +203,14 @@ class Drive(ABC):
     def check(self, model: Model, joint: str, end: float) -> None:  # noqa: B027
         """InputError where the drive does not fit the joint, or a simulation from 0 to `end`."""
 
+    def notes(self, end: float) -> list[str]:
+        """What the reader of a simulation from 0 to `end` [s] should know of this drive."""
+        return []
+
     @abstractmethod
-    def apply(self, simulation: Any, joint: str) -> None:
-        """Set this drive on ``joint`` of a ``_core.Simulation``."""
+    def apply(self, simulation: Any, joint: str, span: Span | None = None) -> None:
+        """Set this drive on ``joint`` of a ``_core.Simulation``; functions are looked at over the
+        span, where it is given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,16 +219,27 @@ class Torque(Drive):
 
     value: a number (a joint of one degree of freedom), an array (nv,), a Table, or a function
     ``value(t, q, v)`` of time [s] and the joint's own position and rate that returns either.
+    breakpoints: Of a function, the times [s] at which it jumps or has a kink, such as those of a
+        sampled controller; () for none. Without them the function is called before the run, to
+        see when it changes.
     """
 
     value: float | npt.ArrayLike | Table | Callable[[float, Array, Array], npt.ArrayLike]
+    breakpoints: npt.ArrayLike | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "breakpoints", as_breakpoints(self.breakpoints, "torque"))
         if not isinstance(self.value, Table) and not callable(self.value):
             object.__setattr__(self, "value", np.atleast_1d(_finite(self.value, "torque")))
 
-    def apply(self, simulation: Any, joint: str) -> None:
-        _hand_over(simulation, "drive_torque", joint, self.value)
+    def notes(self, end: float) -> list[str]:
+        return _notes(self.value, self.breakpoints, end)
+
+    def apply(self, simulation: Any, joint: str, span: Span | None = None) -> None:
+        def known(function: Callable[..., Any]) -> dict[str, Any]:
+            return course(function, self.breakpoints, span, _moved_state)
+
+        _hand_over(simulation, "drive_torque", joint, self.value, known)
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +263,13 @@ class PD(Drive):
         elif self.target.values.shape[1] != 1:
             raise InputError("pd target: the table has several columns; name one")
 
-    def apply(self, simulation: Any, joint: str) -> None:
+    def notes(self, end: float) -> list[str]:
+        if not isinstance(self.target, Table):
+            return []
+        times = self.target.times
+        return [*notes_on_span(times, end), *notes_on_turn(times, self.target.values[:, 0])]
+
+    def apply(self, simulation: Any, joint: str, span: Span | None = None) -> None:
         if isinstance(self.target, Table):
             table = self.target
             simulation.drive_pd_table(
@@ -248,7 +301,7 @@ class Spring(Drive):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "rest", _scalar(self.rest, "spring rest"))
 
-    def apply(self, simulation: Any, joint: str) -> None:
+    def apply(self, simulation: Any, joint: str, span: Span | None = None) -> None:
         simulation.drive_pd(joint, self.stiffness, self.damping, self.rest)
 
 
@@ -260,13 +313,17 @@ class Motion(Drive):
         whole simulation; or a function ``value(t)`` that returns position, velocity and
         acceleration. The joint starts on the motion, whatever the initial state says.
 
+    breakpoints: Of a function, as for `Torque`.
+
     Tables whose position, velocity or acceleration jumps are refused: the load would be that of
     the interpolation, not of the motion.
     """
 
     value: Table | Callable[[float], tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]]
+    breakpoints: npt.ArrayLike | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "breakpoints", as_breakpoints(self.breakpoints, "motion"))
         if isinstance(self.value, Table):
             check_smooth(self.value)
         elif not callable(self.value):
@@ -302,15 +359,21 @@ class Motion(Drive):
                 f"t = {when[row]:g} s ({positions[row, column]:g}); give a motion within them"
             )
 
-    def apply(self, simulation: Any, joint: str) -> None:
-        _hand_over(simulation, "drive_motion", joint, self.value)
+    def notes(self, end: float) -> list[str]:
+        return [] if isinstance(self.value, Table) else _notes(self.value, self.breakpoints, end)
+
+    def apply(self, simulation: Any, joint: str, span: Span | None = None) -> None:
+        def known(function: Callable[..., Any]) -> dict[str, Any]:
+            return course(function, self.breakpoints, span, part=lambda value: value[2])
+
+        _hand_over(simulation, "drive_motion", joint, self.value, known)
 
 
 @dataclass(frozen=True)
 class Locked(Drive):
     """The joint is held at its initial position; its load holds the whole wrench."""
 
-    def apply(self, simulation: Any, joint: str) -> None:
+    def apply(self, simulation: Any, joint: str, span: Span | None = None) -> None:
         simulation.drive_locked(joint)
 
 
@@ -318,7 +381,7 @@ class Locked(Drive):
 class Free(Drive):
     """No drive: only the joint's own damping, friction and spring act (also the default)."""
 
-    def apply(self, simulation: Any, joint: str) -> None:
+    def apply(self, simulation: Any, joint: str, span: Span | None = None) -> None:
         simulation.drive_free(joint)
 
 
@@ -328,12 +391,15 @@ class Wrench:
 
     value: [fx fy fz nx ny nz] in N and N m, or a Table of these six, or a function ``value(t)``.
     frame: the axes of the components, "world" or "body".
+    breakpoints: Of a function, as for `Torque`.
     """
 
     value: npt.ArrayLike | Table | Callable[[float], npt.ArrayLike]
     frame: Frame = field(default="world")
+    breakpoints: npt.ArrayLike | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "breakpoints", as_breakpoints(self.breakpoints, "wrench"))
         if self.frame not in ("world", "body"):
             raise InputError(f"wrench frame: '{self.frame}' is unknown; use world or body")
         if isinstance(self.value, Table):
@@ -346,9 +412,18 @@ class Wrench:
         if shape != (6,):
             raise InputError(f"wrench: shape {shape}; give six components fx fy fz nx ny nz")
 
-    def apply(self, simulation: Any, body: str) -> None:
-        """Set this wrench on ``body`` of a ``_core.Simulation``."""
-        _hand_over(simulation, "wrench", body, self.value, frame=self.frame)
+    def notes(self, end: float) -> list[str]:
+        """What the reader of a simulation from 0 to `end` [s] should know of this wrench."""
+        return _notes(self.value, self.breakpoints, end)
+
+    def apply(self, simulation: Any, body: str, span: Span | None = None) -> None:
+        """Set this wrench on ``body`` of a ``_core.Simulation``; a function is looked at over the
+        span, where it is given."""
+
+        def known(function: Callable[..., Any]) -> dict[str, Any]:
+            return course(function, self.breakpoints, span)
+
+        _hand_over(simulation, "wrench", body, self.value, known, frame=self.frame)
 
 
 def as_drive(value: Any) -> Drive:

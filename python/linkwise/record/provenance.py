@@ -58,6 +58,8 @@ def describe(drive: Any) -> dict[str, Any]:
     told: dict[str, Any] = {"kind": type(drive).__name__.lower()}
     for field in dataclasses.fields(drive):
         value: Any = getattr(drive, field.name)
+        if value is None:
+            continue
         if hasattr(value, "times"):
             span = [float(value.times[0]), float(value.times[-1])]
             told[field.name] = {"table": list(value.values.shape), "times": span}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -168,7 +169,7 @@ def simulate_batch(
     for one in models:
         by_joint, by_body = check_driven(one, drives, wrenches)
         simulation = _core.Simulation(one, **options, method="articulated_body", threads=1)
-        set_driven(simulation, one, by_joint, by_body, float(sampled[-1]))
+        notes = set_driven(simulation, one, by_joint, by_body, float(sampled[-1]))
         simulations.append(simulation)
     lead, rows = _members(given, len(models))
     lead = lead if isinstance(model, Model) else (len(models), *lead)
@@ -193,6 +194,8 @@ def simulate_batch(
     attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)
     attrs |= warning_attrs(ignored)
     attrs |= {"outcome": "converged" if not early else f"{early} of {count} members ended early"}
+    if notes:
+        attrs["notes"] = json.dumps(notes)
     dataset = dataset.assign_attrs({name: plain(value) for name, value in attrs.items()})
     if interrupted:
         raise SimulationInterrupted(

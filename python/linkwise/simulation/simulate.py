@@ -14,7 +14,9 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import InputError
-from linkwise.drives import Motion, as_drive, as_wrench
+from linkwise.base import Array
+from linkwise.drives import as_drive, as_wrench
+from linkwise.drives.course import Span
 from linkwise.io.complaint import near
 from linkwise.notes import tell, warnings_of
 from linkwise.record.claim import check_target
@@ -93,16 +95,32 @@ def set_driven(
     by_joint: Mapping[str, Drive],
     by_body: Mapping[str, Wrench],
     end: float,
-) -> None:
-    """Give the simulation its drives and wrenches, which must last until `end` [s]."""
+    start: tuple[Array, Array] | None = None,
+) -> list[str]:
+    """Give the simulation its drives and wrenches, which must last until `end` [s].
+
+    Functions are looked at over that time, where the state at the start is given. Returns what the
+    reader of the run should know.
+    """
+    notes = []
     for joint, drive in by_joint.items():
         try:
             drive.check(model, joint, end)
+            span = None
+            if start is not None:
+                q, v = model.q_slice(joint), model.v_slice(joint)
+                span = Span(end, start[0][q].copy(), start[1][v].copy())
+            drive.apply(simulation, joint, span)
         except InputError as error:
             raise InputError(f"drives[{joint!r}]: {error}") from None
-        drive.apply(simulation, joint)
+        notes += [f"drives[{joint!r}]: {note}" for note in drive.notes(end)]
     for body, wrench in by_body.items():
-        wrench.apply(simulation, body)
+        try:
+            wrench.apply(simulation, body, None if start is None else Span(end))
+        except InputError as error:
+            raise InputError(f"wrenches[{body!r}]: {error}") from None
+        notes += [f"wrenches[{body!r}]: {note}" for note in wrench.notes(end)]
+    return notes
 
 
 def _chosen(
@@ -256,13 +274,11 @@ def simulate(
         raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
     if output is not None:
         check_target(output)
+        output = os.path.abspath(output)  # a function of the caller's may change the folder
     options = options_object("numerics", Numerics, numerics).options(tolerance)
-    if "max_step" not in options and any(isinstance(d, Motion) for d in by_joint.values()):
-        # While all joints rest, steps would grow until they pass over a whole short motion.
-        options["max_step"] = float(sampled[-1]) / 50 or None
     count = optional_count("threads", threads)
     simulation = _core.Simulation(model, **options, threads=count)
-    set_driven(simulation, model, by_joint, by_body, float(sampled[-1]))
+    notes = set_driven(simulation, model, by_joint, by_body, float(sampled[-1]), start)
     simulation.start(0.0, *start)
     attrs = provenance(
         model,
@@ -278,6 +294,8 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_body)
+    if notes:
+        attrs["notes"] = json.dumps(notes)
     if output is None:
         _require_memory(schema, sampled.size)
     tell(warnings_of(model), reading=False)

@@ -1,10 +1,36 @@
 #include "linkwise/forces/drive.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "linkwise/forces/coordinate_forces.hpp"
 
 namespace linkwise {
+namespace {
+
+/// The least scale of a motion's velocities, as in the integrator's error test, rad/s or m/s.
+constexpr double motion_floor = 0.01;
+/// A torque may be the rounding error of another one.
+constexpr double rounding_share = 1e-9;
+
+double largest_value(const std::optional<Table>& table) {
+  if (!table) return 0;
+  double largest = 0;
+  std::vector<double> values(table->columns);
+  for (const double t : table->breaks) {
+    table->evaluate(t, values.data());
+    for (const double value : values) largest = std::max(largest, std::abs(value));
+  }
+  return largest;
+}
+
+Breakpoints of_function(const FunctionCourse& course, TableAction action, double tolerance) {
+  if (course.sampled) return find_breakpoints(*course.sampled, action, tolerance);
+  return {course.breakpoints, std::vector(course.breakpoints.size(), Breakpoints::Kind::jump)};
+}
+
+}  // namespace
 
 void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t,
                        const double* q, const double* v, double* tau) {
@@ -58,6 +84,37 @@ void evaluate_motion(const JointInfo& joint, const Drive& drive, double t, doubl
   v[1] = vy;
   a[0] = ax + v[2] * vy;
   a[1] = ay - v[2] * vx;
+}
+
+double largest_action(const Drive& drive) {
+  if (drive.kind == DriveKind::motion) return 0;
+  const double scale = drive.kind == DriveKind::pd ? drive.kp : 1;
+  return scale * std::max(largest_value(drive.table), largest_value(drive.course.sampled));
+}
+
+double largest_action(const Wrench& wrench) {
+  return std::max(largest_value(wrench.table), largest_value(wrench.course.sampled));
+}
+
+Breakpoints breakpoints(const Drive& drive, double tolerance, double largest) {
+  TableAction action;
+  if (drive.kind != DriveKind::motion) action.least = rounding_share * largest;
+  if (drive.kind == DriveKind::motion) {
+    action.floor = motion_floor;
+    action.extended = true;
+  }
+  if (!drive.table) return of_function(drive.course, action, tolerance);
+  if (drive.kind == DriveKind::motion)
+    action.value = 0, action.acceleration = 1;
+  else if (drive.kind == DriveKind::pd)
+    action.value = drive.kp, action.rate = drive.kd;
+  return find_breakpoints(*drive.table, action, tolerance);
+}
+
+Breakpoints breakpoints(const Wrench& wrench, double tolerance, double largest) {
+  const TableAction action{.least = rounding_share * largest};
+  if (wrench.table) return find_breakpoints(*wrench.table, action, tolerance);
+  return of_function(wrench.course, action, tolerance);
 }
 
 void add_wrenches(const Model&, const std::vector<Wrench>& wrenches, double t, const double* poses,

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "linkwise/forces/breakpoints.hpp"
 #include "linkwise/forces/table.hpp"
 #include "linkwise/model/model.hpp"
 
@@ -16,6 +17,14 @@ inline bool is_prescribed(DriveKind kind) {
   return kind == DriveKind::locked || kind == DriveKind::motion;
 }
 
+/// When a function of the caller's changes its course.
+struct FunctionCourse {
+  std::vector<double> breakpoints;  ///< as the caller declares them, increasing
+  /// Otherwise as a look at it before the run has found it: values over time, of a motion the
+  /// accelerations.
+  std::optional<Table> sampled;
+};
+
 struct Drive {
   DriveKind kind = DriveKind::free;
   std::vector<double> value;  ///< torque, or target of pd; one per degree of freedom
@@ -24,6 +33,7 @@ struct Drive {
   std::function<void(double, const double*, const double*, double*)> callable;
   /// (t, then out: coordinates of the joint and their two derivatives): a motion without a table.
   std::function<void(double, double*, double*, double*)> motion;
+  FunctionCourse course;  ///< of either function
   double kp = 0, kd = 0;  ///< N m/rad and N m s/rad, or N/m and N s/m
 };
 
@@ -33,6 +43,7 @@ struct Wrench {
   std::vector<double> value;
   std::optional<Table> table;
   std::function<void(double, double*)> callable;
+  FunctionCourse course;  ///< of the function
 };
 
 /// One drive per joint; adds their torques to tau [nv]. A joint whose motion is given gets none.
@@ -46,6 +57,14 @@ void add_drive_torques(const Model& model, const std::vector<Drive>& drives, dou
 /// the child's frame.
 void evaluate_motion(const JointInfo& joint, const Drive& drive, double t, double* q, double* v,
                      double* a);
+
+/// The times at which the drive or wrench changes its course by itself, whatever the state; empty
+/// for constants. What is less than a share of `largest`, the largest action of any of them, may be
+/// rounding.
+Breakpoints breakpoints(const Drive& drive, double tolerance, double largest);
+Breakpoints breakpoints(const Wrench& wrench, double tolerance, double largest);
+double largest_action(const Drive& drive);
+double largest_action(const Wrench& wrench);
 
 /// Adds the wrenches to external [n_joints][6], in the joints' outboard frames.
 void add_wrenches(const Model& model, const std::vector<Wrench>& wrenches, double t,

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <span>
 
 #include "linkwise/integrate/integrator.hpp"
@@ -15,13 +17,23 @@ inline bool all_finite(std::span<const double> values) {
   return sum == 0.0;
 }
 
-/// An OdeSystem whose evaluations are counted and checked to be finite.
+/// An OdeSystem whose evaluations are counted, checked to be finite, and made on one side of the
+/// times at which the system breaks.
 class CheckedSystem {
  public:
   explicit CheckedSystem(OdeSystem& system) : system_(&system) {}
 
+  /// Before each step: the latest time at which it may end.
+  double begin_step(double t) {
+    const double limit = system_->step_limit(t);
+    earliest_ = system_->breaks_at(t) ? beside(t, infinity) : -infinity;
+    latest_ = limit < infinity && system_->breaks_at(limit) ? beside(limit, -infinity) : infinity;
+    return limit;
+  }
+
   Outcome evaluate(double t, const double* y, double* ydot) {
     ++evaluations;
+    t = std::clamp(t, earliest_, std::max(earliest_, latest_));
     const Outcome outcome = system_->evaluate(t, y, ydot);
     if (outcome != Outcome::converged) return outcome;
     return all_finite({ydot, size()}) ? Outcome::converged : Outcome::not_finite;
@@ -35,6 +47,15 @@ class CheckedSystem {
   long evaluations = 0;
 
  private:
+  static constexpr double infinity = std::numeric_limits<double>::infinity();
+
+  /// The next time, a few roundings away because a function of the caller's may round t as well.
+  static double beside(double t, double towards) {
+    for (int k = 0; k < 4; ++k) t = std::nextafter(t, towards);
+    return t;
+  }
+
+  double earliest_ = -infinity, latest_ = infinity;
   OdeSystem* system_;
 };
 

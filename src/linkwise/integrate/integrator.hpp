@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -36,6 +37,12 @@ struct OdeSystem {
     for (int i = 0; i < size(); ++i) scale[i] = std::abs(y[i]);
   }
 
+  /// The latest time at which a step that begins at t may end: what acts from outside takes another
+  /// course there, which evaluations before and after it would not show. Infinite: none is known.
+  virtual double step_limit(double /*t*/) { return std::numeric_limits<double>::infinity(); }
+  /// Whether f(t, y) or a low derivative of it jumps at time t, so that methods begin anew there.
+  virtual bool breaks_at(double /*t*/) { return false; }
+
   /// Called after each accepted step, with y normalised.
   virtual void accepted(double /*t*/, const double* /*y*/) {}
 };
@@ -70,8 +77,10 @@ class Integrator {
   virtual void start(double t0, std::span<const double> y0) = 0;
 
   /// Takes one accepted step from time(), past t_limit where the method's own step leads there: the
-  /// steps do not depend on where output is asked for. After an outcome other than `converged`,
-  /// time() and the state there are those of the last accepted step and only start() may follow.
+  /// steps do not depend on where output is asked for. They end at the system's step_limit() at the
+  /// latest, and where it breaks, f is evaluated on one side of the break in each step. After an
+  /// outcome other than `converged`, time() and the state there are those of the last accepted step
+  /// and only start() may follow.
   virtual Outcome step(double t_limit) = 0;
 
   /// Writes y(t), normalised, for t within the last step (or at the start, before the first one).

@@ -23,6 +23,8 @@ class BodyVelocityState final : public IntegratedState {
   void position_rates(const double* q, const double* w, double* qdot) override;
   void normalise(double* y) override { normalise_quaternions(model_, y); }
   void accepted(double t, const double* y) override;
+  double step_limit(double t) override { return host_.step_limits->after(t); }
+  bool breaks_at(double t) override { return host_.step_limits->breaks_at(t); }
 
   const Model& model_;
   Host host_;

@@ -8,6 +8,7 @@
 
 #include "linkwise/dynamics/forward_dynamics.hpp"
 #include "linkwise/integrate/integrator.hpp"
+#include "linkwise/simulate/step_limits.hpp"
 
 namespace linkwise {
 
@@ -20,6 +21,7 @@ class IntegratedState : public OdeSystem {
     /// Makes an evaluation, whose results are ydot [n], and says what it is worth.
     std::function<Outcome(double t, const Evaluation& evaluation, const double* ydot, int n)> judge;
     std::function<void()> accepted;
+    StepLimits* step_limits;
   };
 
   /// y of joint coordinates and rates.

@@ -16,7 +16,7 @@ constexpr NumericsEntry table[] = {
     {"integrator", &Numerics::integrator, "one of linkwise.integrators()"},
     {"step", &Numerics::step, "step of the fixed-step integrators, s"},
     {"max_step", &Numerics::max_step,
-     "longest step of the others, s; with given motions a fiftieth of the duration by default"},
+     "longest step of the others, s; what acts by the clock is seen without it"},
     {"max_steps", &Numerics::max_steps, "most steps of the whole run; no bound by default"},
     {"method", &Numerics::method,
      "how accelerations are computed: auto, or one of linkwise.methods()"},

@@ -1,5 +1,7 @@
 #include "linkwise/simulate/setup.hpp"
 
+#include <algorithm>
+
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/evaluator.hpp"
 #include "linkwise/simulate/given_motion.hpp"
@@ -39,6 +41,7 @@ void Setup::add_wrench(Wrench wrench) {
         "body '" + model->links[info.link].name + "'" + model->where() +
         " has no mass, so no wrench can act on it; apply it to the next body outboard");
   wrenches.push_back(std::move(wrench));
+  settled_ = false;
 }
 
 void Setup::settle() {
@@ -50,7 +53,26 @@ void Setup::settle() {
                      " takes no motion drives; use the state joint_rates for them");
   driven_ = driven_model(*model, drives);
   require_determined(driven());
+  find_breakpoints();
   settled_ = true;
+}
+
+/// As fine as the error test can tell, but neither finer than tables are written nor so coarse that
+/// what acts is not seen.
+void Setup::find_breakpoints() {
+  constexpr double finest = 1e-8, coarsest = 1e-4;
+  const IntegratorOptions& o = options.integration;
+  const double tolerance =
+      std::clamp(o.relative_tolerance > 0 ? o.relative_tolerance : o.tolerance, finest, coarsest);
+  breakpoints_.clear();
+  const auto keep = [this](Breakpoints found) {
+    if (!found.times.empty()) breakpoints_.push_back(std::move(found));
+  };
+  double largest = 0;
+  for (const Drive& drive : drives) largest = std::max(largest, largest_action(drive));
+  for (const Wrench& wrench : wrenches) largest = std::max(largest, largest_action(wrench));
+  for (const Drive& drive : drives) keep(linkwise::breakpoints(drive, tolerance, largest));
+  for (const Wrench& wrench : wrenches) keep(linkwise::breakpoints(wrench, tolerance, largest));
 }
 
 void check_members(const Setup& setup) {

@@ -41,9 +41,14 @@ struct Setup {
   const Model& driven() const { return driven_ ? *driven_ : *model; }
   bool any_given() const { return driven_ != nullptr; }
   bool any_motion() const { return any_motion_; }
+  /// Of every drive and wrench that has some.
+  const std::vector<Breakpoints>& breakpoints() const { return breakpoints_; }
 
  private:
+  void find_breakpoints();
+
   std::unique_ptr<const Model> driven_;
+  std::vector<Breakpoints> breakpoints_;
   bool any_motion_ = false, settled_ = false;
 };
 

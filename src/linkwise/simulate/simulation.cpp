@@ -34,6 +34,7 @@ void Simulation::start(double t0, const Start& start) {
   make_methods(t0);
   for (size_t i = 0; i < members_; ++i) check_locked_joints(m, setup_->drives, start.v + i * nv());
   forces_.emplace(*setup_, members_, start.tau);
+  step_limits_.emplace(setup_->breakpoints(), t0);
   inverse_.reset();
   given_.assign(members_ * nv(), 0.0);
   y_.assign(start.q, start.q + members_ * nq());
@@ -53,7 +54,8 @@ void Simulation::start(double t0, const Start& start) {
          [this](double t, const auto& evaluation, const double* ydot, int n) {
            return judge(t, observed(t, evaluation), ydot, n);
          },
-         [this] { report_accepted(); }});
+         [this] { report_accepted(); },
+         &*step_limits_});
     system = state_.get();
   }
   integrator_ = make_integrator(setup_->options.integrator, *system, setup_->options.integration);
@@ -186,7 +188,17 @@ Ending Simulation::failure(size_t member, double t, Outcome outcome, int body,
     for (int i = info.v; i < info.v + info.nv && body < 0; ++i)
       if (!(std::abs(du[i]) < largest_acceleration)) joint = j;
   }
-  return {outcome, t, joint, std::string(message(outcome)) + "; " + remedy_at(m, outcome, body)};
+  return {outcome, t, joint, described(outcome, body)};
+}
+
+/// A fixed step that is too long for a stiff machine ends in states that cannot be evaluated.
+std::string Simulation::described(Outcome outcome, int body) const {
+  const bool of_state = outcome == Outcome::not_finite || outcome == Outcome::not_positive_definite;
+  if (!of_state || !find_integrator(setup_->options.integrator).fixed_step)
+    return std::string(message(outcome)) + "; " + remedy_at(model(), outcome, body);
+  return std::string(message(outcome)) +
+         "; take a smaller step, or an integrator that chooses its steps. If that does not help, " +
+         remedy_at(model(), outcome, body);
 }
 
 // ---- What the integrator sees -------------------------------------------------------------------
@@ -237,7 +249,10 @@ void Simulation::normalise(double* y) {
 
 void Simulation::accepted(double t, const double* y) {
   report_accepted();
-  if (solver_tolerance_) solver_tolerance_->accepted(t, y, rates_in(y));
+  if (solver_tolerance_) {
+    if (breaks_at(t)) solver_tolerance_->start(t);  // steps are tiny again
+    solver_tolerance_->accepted(t, y, rates_in(y));
+  }
   if (method_) method_->accepted(t);
 }
 
@@ -314,7 +329,7 @@ bool Simulation::reach(double t) {
     // The failure within the step says more than the failure of the step.
     if (failure_.outcome == outcome) return end_all(failure_);
     const int joint = outcome == Outcome::interrupted ? -1 : failure_.joint;
-    return end_all({outcome, integrator_->time(), joint, describe(outcome)});
+    return end_all({outcome, integrator_->time(), joint, described(outcome)});
   }
   return any_running();
 }

@@ -12,6 +12,7 @@
 #include "linkwise/simulate/quantity.hpp"
 #include "linkwise/simulate/setup.hpp"
 #include "linkwise/simulate/solver_tolerance.hpp"
+#include "linkwise/simulate/step_limits.hpp"
 
 namespace linkwise {
 
@@ -87,6 +88,8 @@ class Simulation : private OdeSystem {
   void normalise(double* y) override;
   void accepted(double t, const double* y) override;
   void error_scale(const double* y, double* scale) const override;
+  double step_limit(double t) override { return step_limits_->after(t); }
+  bool breaks_at(double t) override { return step_limits_->breaks_at(t); }
 
   void make_methods(double t0);
   bool follows_error_test() const;
@@ -100,6 +103,7 @@ class Simulation : private OdeSystem {
     if (observer_) observer_->accepted();
   }
   Outcome judge(double t, const DynamicsReport& report, const double* du, int n);
+  std::string described(Outcome outcome, int body = -1) const;
   Ending failure(size_t member, double t, Outcome outcome, int body, const double* du) const;
 
   void to_state(double* y) const;
@@ -117,6 +121,7 @@ class Simulation : private OdeSystem {
   ParentAxes parent_axes_;
   size_t members_ = 1;
   std::optional<AppliedForces> forces_;
+  std::optional<StepLimits> step_limits_;
   /// Of one member; loads at output times are computed apart, to the fixed tolerance.
   std::unique_ptr<DynamicsMethod> method_, output_method_;
   std::unique_ptr<SolverTolerance> solver_tolerance_;  ///< of one member; null: a fixed one

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <limits>
 #include <ostream>
 #include <set>
@@ -219,6 +220,46 @@ TEST_P(EveryIntegrator, AdvancesASystemWithoutUnknowns) {
   integrate_to(*integrator, 0.5, 0, &outcome);
   EXPECT_EQ(outcome, Outcome::converged);
   EXPECT_GE(integrator->time(), 0.5);
+}
+
+/// v' = 8 between 2.03 and 2.08, else 0: the value at either time itself is wrong.
+struct Pulsed : FirstOrder {
+  static constexpr double begin = 2.03, end = 2.08;
+  Pulsed()
+      : FirstOrder(1, [this](double t, const double*, double* rate) {
+          rate[0] = t == begin || t == end ? 1e6 : t > begin && t < end ? 8.0 : 0.0;
+          evaluated.push_back(t);
+          return true;
+        }) {}
+  double step_limit(double t) override {
+    return t < begin ? begin : t < end ? end : std::numeric_limits<double>::infinity();
+  }
+  bool breaks_at(double t) override { return t == begin || t == end; }
+
+  std::vector<double> evaluated;
+};
+
+TEST_P(EveryIntegrator, MeetsEveryBreakOfTheSystem) {
+  Pulsed system;
+  const auto integrator = make(system, 0.5);
+  integrator->start(0.0, std::vector<double>{0.0});
+  double before = 0.0;
+  while (integrator->time() < 3.0) {
+    system.evaluated.clear();
+    ASSERT_EQ(integrator->step(3.0), Outcome::converged);
+    for (const double t : system.evaluated)
+      for (const double at : {Pulsed::begin, Pulsed::end}) {
+        EXPECT_FALSE(before >= at && t < at) << t;
+        EXPECT_FALSE(integrator->time() <= at && t > at) << t;
+      }
+    before = integrator->time();
+  }
+  for (const double at : {Pulsed::begin, Pulsed::end})
+    EXPECT_EQ(std::count(system.accepted_times.begin(), system.accepted_times.end(), at), 1);
+  EXPECT_LT(system.accepted_times.size(), 60);
+  std::vector<double> v(1);
+  integrator->interpolate(3.0, v);
+  EXPECT_NEAR(v[0], 8.0 * (Pulsed::end - Pulsed::begin), 1e-9);
 }
 
 TEST_P(EveryIntegrator, AnnouncesEveryAcceptedStep) {

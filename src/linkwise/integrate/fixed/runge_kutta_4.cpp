@@ -27,6 +27,8 @@ class RungeKutta4 final : public FixedStep {
     end_rate_known_ = false;
   }
 
+  void renew() override { end_rate_known_ = false; }
+
   Outcome advance(double t, double h) override {
     if (!end_rate_known_) {
       const Outcome outcome = system_.evaluate(t, y().data(), end_rate_.data());

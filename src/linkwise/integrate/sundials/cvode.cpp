@@ -37,6 +37,9 @@ constexpr double largest_drift = 1e-3;
 /// Steps whose error is to stay below this share of a value fail for rounding alone.
 constexpr double rounding = 64 * std::numeric_limits<double>::epsilon();
 
+/// A stop time that is not reached.
+constexpr double never = 1e300;
+
 class Cvode final : public Integrator {
  public:
   Cvode(int method, OdeSystem& system, const IntegratorOptions& options);
@@ -184,9 +187,12 @@ Outcome Cvode::step(double /*t_limit*/) {
     return Outcome::too_many_steps;
   }
   if (restart_needed_) restart();
+  const double limit = system_.begin_step(time_);
+  check(CVodeSetStopTime(memory_.get(), std::min(limit, never)), "CVodeSetStopTime");
   // CVODE bounds its very first step by a tenth of the distance to this time and ignores it later.
   // It is not t_limit, or the first step would depend on the output times.
-  const double horizon = time_ + (options_.max_step > 0.0 ? 10.0 * options_.max_step : 1.0);
+  const double reach = options_.max_step > 0.0 ? 10.0 * options_.max_step : 1.0;
+  const double horizon = std::min(time_ + reach, limit);
   sunrealtype t = time_;
   const int flag = CVode(memory_.get(), horizon, y_.get(), &t, CV_ONE_STEP);
   if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
@@ -199,6 +205,7 @@ Outcome Cvode::step(double /*t_limit*/) {
   }
   time_ = t;
   ++steps_since_failure_;
+  restart_needed_ = t == limit && system_->breaks_at(t);
   std::copy_n(data(y_), size(), state_.begin());
   system_->normalise(state_.data());
   for (std::size_t i = 0; i < size(); ++i) {
