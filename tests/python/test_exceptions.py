@@ -40,6 +40,7 @@ def every_exception():
         refused,
         lw.SimulationInterrupted("interrupted at t = 1 s", failed.run),
         lw.NumericsError("no solution"),
+        lw.ModelWarning("the link has no mass"),
     ]
 
 

@@ -144,15 +144,19 @@ def test_numbering_does_not_matter(tree, random):
     assert load_error(there.joint_load[back], here.joint_load, floor=1.0) < 1e-9
 
 
+# Their armatures have a momentum that turns: test_turning_rates.py.
+TURNING = ("floating", "planar", "spherical")
+
+
 @given(trees(max_joints=5), st.integers(0, 2**16))
 def test_armature_adds_to_the_diagonal(tree, seed):
-    """Rotor inertia acts on its own freedom alone and leaves inverse-dynamics loads as they are."""
+    """Rotor inertia acts on its own freedom alone, unless the joint's rates turn with the body."""
     rng = np.random.default_rng(seed)
     rotors = rng.uniform(0.1, 1.0, len(tree.joints))
     geared = replace(
         tree,
         joints=tuple(
-            replace(joint, armature=float(r)) if joint.type not in ("floating",) else joint
+            replace(joint, armature=float(r)) if joint.type not in TURNING else joint
             for joint, r in zip(tree.joints, rotors, strict=True)
         ),
     )
