@@ -144,32 +144,35 @@ def test_numbering_does_not_matter(tree, random):
     assert load_error(there.joint_load[back], here.joint_load, floor=1.0) < 1e-9
 
 
-# Their armatures have a momentum that turns: test_turning_rates.py.
-TURNING = ("floating", "planar", "spherical")
-
-
 @given(trees(max_joints=5), st.integers(0, 2**16))
 def test_armature_adds_to_the_diagonal(tree, seed):
-    """Rotor inertia acts on its own freedom alone, unless the joint's rates turn with the body."""
+    """Rotor inertia acts on its own freedom alone and leaves inverse-dynamics loads as they are.
+
+    In a plane its momentum r u along axes that turn changes by w x (r u), too."""
     rng = np.random.default_rng(seed)
     rotors = rng.uniform(0.1, 1.0, len(tree.joints))
     geared = replace(
         tree,
         joints=tuple(
-            replace(joint, armature=float(r)) if joint.type not in TURNING else joint
+            replace(joint, armature=float(r)) if joint.type not in ("floating",) else joint
             for joint, r in zip(tree.joints, rotors, strict=True)
         ),
     )
     plain, model = tree.build(), geared.build()
     q, v, a = state(tree, model)
-    extra = np.zeros(model.nv)
+    extra, turning = np.zeros((2, model.nv))
     for joint in geared.joints:
-        extra[model.v_slice(joint.name)] = joint.armature
+        own = model.v_slice(joint.name)
+        extra[own] = joint.armature
+        if joint.type == "planar":
+            u, w = v[own][:2], v[own][2]
+            turning[own] = [-w * joint.armature * u[1], w * joint.armature * u[0], 0]
     assert_close(
         lw.mass_matrix(model, q), lw.mass_matrix(plain, q) + np.diag(extra), 1e-12, axis=(-2, -1)
     )
     tau = lw.inverse_dynamics(model, q, v, a)
-    assert_close(tau, lw.inverse_dynamics(plain, q, v, a) + extra * a, 1e-11, floor=1.0)
+    expected = lw.inverse_dynamics(plain, q, v, a) + extra * a + turning
+    assert_close(tau, expected, 1e-11, floor=1.0)
     for method in METHODS:
         assert_close(lw.forward_dynamics(model, q, v, tau, method=method), a, 1e-9, floor=1.0)
 

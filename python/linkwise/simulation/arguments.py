@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Mapping
-from dataclasses import fields
-from typing import Any, ParamSpec, TypeVar
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,40 +14,27 @@ from linkwise._core import InputError, as_floats
 _DEFAULT_SAMPLES = 1000
 _MAX_SAMPLES = 100_000_000
 
-P = ParamSpec("P")
-R = TypeVar("R")
 T = TypeVar("T")
 
 
-def moved(**places: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Decorates a function that had these keywords: using one is a TypeError that says what to
-    write instead, with the keyword in the place of {}."""
-
-    def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        @functools.wraps(function)
-        def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-            for name in kwargs:
-                if name in places:
-                    raise TypeError(f"{name}: give it as {places[name].format(name)}")
-            return function(*args, **kwargs)
-
-        return checked
-
-    return decorate
-
-
-def options_object(argument: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
+def options_object(
+    argument: str,
+    kind: type[T],
+    given: T | Mapping[str, Any] | None,
+    keywords: dict[str, Any] | None = None,
+) -> T:
     """The dataclass `kind` from one itself, or from its fields by name; InputError where a name is
-    unknown."""
-    if given is None or isinstance(given, kind):
-        return given or kind()
+    unknown. Of keywords those that are fields of it are taken out and go before."""
     known = [field.name for field in fields(kind)]  # type: ignore[arg-type]
-    if not isinstance(given, Mapping):
+    if given is not None and not isinstance(given, kind | Mapping):
         raise InputError(f"{argument}: {given!r} given; give a linkwise.{kind.__name__}")
-    for name in given:
-        if name not in known:
-            raise InputError(f"{argument}: unknown option {name!r}; known: {', '.join(known)}")
-    return kind(**given)
+    if isinstance(given, Mapping):
+        for name in given:
+            if name not in known:
+                raise InputError(f"{argument}: unknown option {name!r}; known: {', '.join(known)}")
+        given = kind(**given)
+    taken = {name: keywords.pop(name) for name in known if keywords and name in keywords}
+    return replace(given or kind(), **taken)  # type: ignore[type-var]
 
 
 def number(name: str, value: Any) -> float:

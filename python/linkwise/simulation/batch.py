@@ -16,7 +16,7 @@ from linkwise.notes import tell, warning_attrs, warnings_of
 from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
-from linkwise.simulation.arguments import moved, number, optional_count, sample_times
+from linkwise.simulation.arguments import number, optional_count, sample_times
 from linkwise.simulation.simulate import SimulationInterrupted, check_driven, set_driven
 
 if TYPE_CHECKING:
@@ -101,7 +101,6 @@ def _dataset(
     )
 
 
-@moved(quantities="record=[...]")
 def simulate_batch(
     model: Model | Sequence[Model],
     *,

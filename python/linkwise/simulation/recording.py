@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from linkwise.simulation.arguments import options_object
 
@@ -23,8 +24,13 @@ class Recording:
     scenario_text: str = ""
 
     @classmethod
-    def of(cls, given: Recording | Mapping[str, object] | Collection[str] | None) -> Recording:
-        """From one itself, from its attributes by name, or from names of quantities."""
-        if given is None or isinstance(given, Recording | Mapping):
-            return options_object("record", cls, given)
-        return cls(quantities=given)
+    def of(
+        cls,
+        given: Recording | Mapping[str, object] | Collection[str] | None,
+        keywords: dict[str, Any] | None = None,
+    ) -> Recording:
+        """From one itself, from its attributes by name, or from names of quantities; of keywords
+        its attributes are taken out and go before."""
+        if not (given is None or isinstance(given, Recording | Mapping)):
+            given = cls(quantities=given)
+        return options_object("record", cls, given, keywords)

@@ -26,7 +26,6 @@ from linkwise.record.schema import Schema, build_schema
 from linkwise.record.store import RunWriter
 from linkwise.results import Run
 from linkwise.simulation.arguments import (
-    moved,
     optional_count,
     options_object,
     sample_times,
@@ -39,10 +38,6 @@ from linkwise.simulation.time_loop import Ending, Progress, run_time_loop
 if TYPE_CHECKING:
     from linkwise._core import Model, Simulation
     from linkwise.drives import Drive, Wrench
-
-
-_IN_NUMERICS = "numerics=lw.Numerics({}=...)"
-_IN_RECORD = "record=lw.Recording({}=...)"
 
 
 class _Stopped(BaseException):
@@ -204,10 +199,6 @@ def _require_memory(schema: Schema, samples: int) -> None:
     )
 
 
-@moved(
-    **dict.fromkeys(("integrator", "method", "solver", "step", "max_step"), _IN_NUMERICS),
-    **dict.fromkeys(("quantities", "joints", "scenario_text"), _IN_RECORD),
-)
 def simulate(
     model: Model,
     *,
@@ -225,6 +216,7 @@ def simulate(
     output: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
     on_failure: Literal["raise", "return"] = "raise",
+    **options: Any,
 ) -> Run:
     """Simulate the motion of `model` from time 0 and return labelled results.
 
@@ -243,8 +235,7 @@ def simulate(
         tolerance: Accuracy to aim at, relative to the size of the state and absolute; 1e-6 by
             default.
         numerics: Integrator, step, method, solver and the rarer options: a `Numerics`, or a
-            dictionary such as `{"integrator": "runge_kutta_4", "step": 1e-3}`.
-            `linkwise.numerics()` lists all with their defaults.
+            dictionary. `linkwise.numerics()` lists all with their defaults.
         threads: Worker threads; the results do not depend on it.
         record: Names of the quantities to record, such as `["joint_load", "position"]`, or a
             `Recording`, which also picks joints; everything by default.
@@ -254,6 +245,8 @@ def simulate(
         progress: Called with a `Progress` a few times a second.
         on_failure: "raise" SimulationError (SimulationInterrupted on Ctrl-C), or "return" the run
             that ended early; its `outcome` says why.
+        options: Single fields of `numerics` and `record`, such as `integrator="bdf"`,
+            `step=1e-3` or `joints=["elbow"]`; they go before those objects.
 
     Raises:
         InputError: an argument is wrong; nothing was written.
@@ -268,14 +261,17 @@ def simulate(
         state_vector("v0", v0, model.nv, np.zeros(model.nv)),
     )
     by_joint, by_body = check_driven(model, drives, wrenches)
-    recording = Recording.of(record)
+    recording = Recording.of(record, options)
+    chosen = options_object("numerics", Numerics, numerics, options)
+    for name in options:
+        raise TypeError(f"simulate() got an unexpected keyword argument {name!r}")
     schema = build_schema(model, recording.quantities, recording.joints, by_body)
     if on_failure not in ("raise", "return"):
         raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
     if output is not None:
         check_target(output)
         output = os.path.abspath(output)  # a function of the caller's may change the folder
-    options = options_object("numerics", Numerics, numerics).options(tolerance)
+    options = chosen.options(tolerance)
     count = optional_count("threads", threads)
     simulation = _core.Simulation(model, **options, threads=count)
     notes = set_driven(simulation, model, by_joint, by_body, float(sampled[-1]), start)

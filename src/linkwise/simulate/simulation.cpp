@@ -54,8 +54,7 @@ void Simulation::start(double t0, const Start& start) {
          [this](double t, const auto& evaluation, const double* ydot, int n) {
            return judge(t, observed(t, evaluation), ydot, n);
          },
-         [this] { report_accepted(); },
-         &*step_limits_});
+         [this] { report_accepted(); }, &*step_limits_});
     system = state_.get();
   }
   integrator_ = make_integrator(setup_->options.integrator, *system, setup_->options.integration);

@@ -173,17 +173,20 @@ def test_progress_is_reported(chain):
 # -- wrong arguments -----------------------------------------------------------------------------
 
 
-def test_a_keyword_that_moved_says_where_to(chain):
-    for name, place in [
-        ("method", "numerics=lw.Numerics(method=...)"),
-        ("max_step", "numerics=lw.Numerics(max_step=...)"),
-        ("joints", "record=lw.Recording(joints=...)"),
-    ]:
-        with pytest.raises(TypeError) as caught:
-            lw.simulate(chain, duration=1.0, **{name: 1})
-        assert str(caught.value) == f"{name}: give it as {place}"
-    with pytest.raises(TypeError, match=r"quantities: give it as record=\[...\]"):
-        lw.simulate_batch(chain, duration=1.0, step=0.1, quantities=["position"])
+def test_single_options_may_be_keywords(chain):
+    """Fields of numerics and record, which go before those objects."""
+    options = {"duration": 0.1, "q0": bend(chain)}
+    run = lw.simulate(
+        chain, numerics=lw.Numerics(integrator="bdf", max_step=0.01), integrator="runge_kutta_4",
+        step=0.05, quantities=["position"], joints=["joint_2"], **options,
+    )  # fmt: skip
+    told = json.loads(run.attrs["options"])
+    assert (told["integrator"], told["step"], told["max_step"]) == ("runge_kutta_4", 0.05, 0.01)
+    assert "joint_load" not in run.dataset
+    with pytest.raises(TypeError, match="unexpected keyword argument 'stepsize'"):
+        lw.simulate(chain, stepsize=0.05, **options)
+    with pytest.raises(lw.InputError, match="step: -1 given"):
+        lw.simulate(chain, step=-1, **options)
 
 
 @pytest.mark.parametrize(
