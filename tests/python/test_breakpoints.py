@@ -220,7 +220,7 @@ def test_a_function_that_is_on_for_a_while(rotor, integrator, breakpoints):
         rotor, times=[20.0], drives={"axle": drive}, numerics={"integrator": integrator}
     )
     assert run.position[-1, 0] == pytest.approx(angle_after(TORQUE, 5, 1, 20), abs=1e-4)
-    assert bool(run.notes) == (breakpoints is None)
+    assert bool(run.warnings) == (breakpoints is None)
     wrench = lw.Wrench(lambda t: [0, 0, 0, 0, 0, on_off(t, 0, 0)], breakpoints=breakpoints)
     run = lw.simulate(
         rotor, times=[20.0], wrenches={"disc": wrench}, numerics={"integrator": integrator}
@@ -236,9 +236,10 @@ def test_declared_breakpoints_find_what_samples_miss(rotor):
         rotor, times=[20.0], drives={"axle": lw.Torque(hit, breakpoints=[7.3, 7.3001])}
     )
     assert run.velocity[-1, 0] == pytest.approx(1 / INERTIA, rel=1e-6)
-    (note,) = lw.simulate(rotor, times=[20.0], drives={"axle": hit}).notes
-    assert "drives['axle']: is a function without breakpoints=" in note
-    assert "0.00977 s" in note
+    (note,) = lw.simulate(rotor, times=[20.0], drives={"axle": hit}).warnings
+    assert note["element"] == "drives['axle']"
+    assert "is a function without breakpoints=" in note["text"]
+    assert "0.00977 s" in note["text"]
 
 
 class Sampled:
@@ -314,19 +315,22 @@ def test_a_table_that_does_not_cover_the_run_is_noted(rotor, tmp_path):
     drives = ({"axle": late}, {"axle": lw.PD(10, 1, late)})
     for drive in drives:
         run = lw.simulate(rotor, duration=4, output=tmp_path / "run.zarr", drives=drive)
-        assert run.notes == [
-            "drives['axle']: the table covers 2 to 3 s, the simulation 0 to 4 s: "
+        text = (
+            "the table covers 2 to 3 s, the simulation 0 to 4 s: "
             "its first row holds before, its last row holds after"
-        ]
-        assert lw.open_run(tmp_path / "run.zarr").notes == run.notes
-        assert run.notes[0] in repr(run)
+        )
+        assert run.warnings == [{"element": "drives['axle']", "text": text}]
+        assert lw.open_run(tmp_path / "run.zarr").warnings == run.warnings
+        assert text in repr(run)
+        assert lw.loads.summary(run).attrs["warnings"] == run.attrs["warnings"]
     wrench = lw.Wrench(lw.Table([0, 3], np.ones((2, 6))))
-    (note,) = lw.simulate(rotor, duration=4, wrenches={"disc": wrench}).notes
-    assert note.startswith("wrenches['disc']: the table covers 0 to 3 s")
-    assert note.endswith("0 to 4 s: its last row holds after")
+    (note,) = lw.simulate(rotor, duration=4, wrenches={"disc": wrench}).warnings
+    assert note["element"] == "wrenches['disc']"
+    assert note["text"].startswith("the table covers 0 to 3 s")
+    assert note["text"].endswith("0 to 4 s: its last row holds after")
     batch = lw.simulate_batch(rotor, duration=4, step=0.1, drives={"axle": late})
-    assert "covers 2 to 3 s" in json.loads(batch.attrs["notes"])[0]
-    assert lw.simulate(rotor, duration=1, drives={"axle": lw.Table([0, 1], [1, 2])}).notes == []
+    assert "covers 2 to 3 s" in json.loads(batch.attrs["warnings"])[0]["text"]
+    assert lw.simulate(rotor, duration=1, drives={"axle": lw.Table([0, 1], [1, 2])}).warnings == []
 
 
 def test_an_angle_that_is_wrapped_says_so(rotor):
@@ -337,6 +341,7 @@ def test_an_angle_that_is_wrapped_says_so(rotor):
     said = f"jumps by one turn at t = {first:.6g} s: unwrap the angle"
     with pytest.raises(lw.InputError, match=said):
         lw.Motion(wrapped)
-    (note,) = lw.simulate(rotor, duration=5, drives={"axle": lw.PD(10, 1, wrapped)}).notes
-    assert note.startswith(f"drives['axle']: the target {said}")
+    (note,) = lw.simulate(rotor, duration=5, drives={"axle": lw.PD(10, 1, wrapped)}).warnings
+    assert note["element"] == "drives['axle']"
+    assert note["text"].startswith(f"the target {said}")
     lw.Motion(lw.Table(times, np.unwrap(wrapped.values[:, 0]), "cubic"))

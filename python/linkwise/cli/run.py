@@ -80,7 +80,6 @@ def summary(run: Run) -> dict[str, Any]:
     found = {name: attrs.get(name) for name in (*names, *chosen, *counts)}
     found["run"] = shown_path(run.path) if run.path is not None else None
     found["warnings"] = run.warnings
-    found["notes"] = run.notes
     found["samples"] = run.dataset.sizes["time"]
     return found
 
@@ -112,8 +111,6 @@ def show_run(run: Run, as_json: bool) -> None:
         f"by {attrs['method']}{_solver(attrs['solver'])}.",
         markup=False,
     )
-    for note in run.notes:
-        screen.print(f"Note: {note}.", markup=False)
     if beyond:
         screen.print(_limit_note(beyond), markup=False)
     say_warnings(run.warnings)

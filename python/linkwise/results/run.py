@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -82,17 +81,12 @@ class Run:
 
     @property
     def warnings(self) -> list[dict[str, str]]:
-        """What was ignored or assumed when the machine was read: `element` and `text` of each.
+        """What was ignored or assumed when the machine was read, and what the integrator could not
+        see of the inputs: `element` and `text` of each.
 
         Empty as well where an older linkwise wrote the run.
         """
         return recorded_warnings(self.dataset.attrs)
-
-    @property
-    def notes(self) -> list[str]:
-        """What the reader of these results should know of how they came about."""
-        found: list[str] = json.loads(self.dataset.attrs.get("notes", "[]"))
-        return found
 
     def __repr__(self) -> str:
         return "\n".join(map(printable, self._summary()))
@@ -113,7 +107,6 @@ class Run:
         ]
         if not self.completed and attrs.get("message"):
             lines.append(f"  message     {attrs['message']}")
-        lines += [f"  note        {note}" for note in self.notes]
         for name, variable in self.dataset.data_vars.items():
             dims = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
             lines.append(f"  {name!s:<18} ({dims})  {variable.attrs.get('units', '')}")

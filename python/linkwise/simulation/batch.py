@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -191,10 +190,8 @@ def simulate_batch(
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
     early = sum(ending.outcome != "converged" for ending in endings)
     attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)
-    attrs |= warning_attrs(ignored)
+    attrs |= warning_attrs([*notes, *ignored])
     attrs |= {"outcome": "converged" if not early else f"{early} of {count} members ended early"}
-    if notes:
-        attrs["notes"] = json.dumps(notes)
     dataset = dataset.assign_attrs({name: plain(value) for name, value in attrs.items()})
     if interrupted:
         raise SimulationInterrupted(

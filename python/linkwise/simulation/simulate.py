@@ -18,7 +18,7 @@ from linkwise.base import Array
 from linkwise.drives import as_drive, as_wrench
 from linkwise.drives.course import Span
 from linkwise.io.complaint import near
-from linkwise.notes import tell, warnings_of
+from linkwise.notes import Ignored, tell, warning_attrs, warnings_of
 from linkwise.record.claim import check_target
 from linkwise.record.memory import MemoryRecord
 from linkwise.record.provenance import describe, provenance
@@ -91,7 +91,7 @@ def set_driven(
     by_body: Mapping[str, Wrench],
     end: float,
     start: tuple[Array, Array] | None = None,
-) -> list[str]:
+) -> list[Ignored]:
     """Give the simulation its drives and wrenches, which must last until `end` [s].
 
     Functions are looked at over that time, where the state at the start is given. Returns what the
@@ -108,13 +108,13 @@ def set_driven(
             drive.apply(simulation, joint, span)
         except InputError as error:
             raise InputError(f"drives[{joint!r}]: {error}") from None
-        notes += [f"drives[{joint!r}]: {note}" for note in drive.notes(end)]
+        notes += [Ignored("", f"drives[{joint!r}]", note) for note in drive.notes(end)]
     for body, wrench in by_body.items():
         try:
             wrench.apply(simulation, body, None if start is None else Span(end))
         except InputError as error:
             raise InputError(f"wrenches[{body!r}]: {error}") from None
-        notes += [f"wrenches[{body!r}]: {note}" for note in wrench.notes(end)]
+        notes += [Ignored("", f"wrenches[{body!r}]", note) for note in wrench.notes(end)]
     return notes
 
 
@@ -253,7 +253,8 @@ def simulate(
         SimulationError: the simulation could not go on; `.run` holds the results until then.
 
     What was ignored or assumed when the model was made is in `run.warnings`, and a ModelWarning
-    each where `linkwise.load` did not say it.
+    each where `linkwise.load` did not say it. `run.warnings` also names tables that do not cover
+    the run and functions whose short changes may be missed.
     """
     sampled = sample_times(duration, every, times)
     start = (
@@ -290,8 +291,7 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_body)
-    if notes:
-        attrs["notes"] = json.dumps(notes)
+    attrs |= warning_attrs([*notes, *warnings_of(model)])
     if output is None:
         _require_memory(schema, sampled.size)
     tell(warnings_of(model), reading=False)
