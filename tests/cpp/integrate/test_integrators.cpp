@@ -226,8 +226,8 @@ TEST_P(EveryIntegrator, AdvancesASystemWithoutUnknowns) {
 struct Pulsed : FirstOrder {
   static constexpr double begin = 2.03, end = 2.08;
   Pulsed()
-      : FirstOrder(1, [this](double t, const double*, double* rate) {
-          rate[0] = t == begin || t == end ? 1e6 : t > begin && t < end ? 8.0 : 0.0;
+      : FirstOrder(1, [this](double t, const double*, double* ydot) {
+          ydot[0] = t == begin || t == end ? 1e6 : t > begin && t < end ? 8.0 : 0.0;
           evaluated.push_back(t);
           return true;
         }) {}

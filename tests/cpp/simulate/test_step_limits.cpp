@@ -1,8 +1,8 @@
-#include "linkwise/simulate/step_limits.hpp"
-
 #include <limits>
 
 #include <gtest/gtest.h>
+
+#include "linkwise/simulate/step_limits.hpp"
 
 namespace linkwise::test {
 namespace {
