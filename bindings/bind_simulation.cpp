@@ -134,7 +134,7 @@ void bind_ending(nb::module_& m) {
 void bind_drives(nb::class_<PySimulation>& simulation) {
   simulation.def("drive_torque", &PySimulation::torque, "joint"_a, "values"_a)
       .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a,
-           "interpolation"_a = "linear")
+           "interpolation"_a = "linear", "smooth"_a = false)
       .def("drive_torque_callable", &PySimulation::torque_callable, "joint"_a, "fn"_a,
            "breakpoints"_a = nb::none(), "samples"_a = nb::none())
       .def("drive_motion_table", &PySimulation::motion_table, "joint"_a, "times"_a, "values"_a,

@@ -139,9 +139,10 @@ void PySimulation::torque(const std::string& name, nb::handle values) {
 }
 
 void PySimulation::torque_table(const std::string& name, nb::handle times, nb::handle values,
-                                const std::string& interpolation) {
+                                const std::string& interpolation, bool smooth) {
   Drive d;
   d.kind = DriveKind::torque_table;
+  d.smooth = smooth;
   d.table = make_table(times, values, interpolation, width(name));
   set(name, std::move(d));
 }

@@ -18,7 +18,7 @@ class PySimulation {
 
   void torque(const std::string& joint, nb::handle values);
   void torque_table(const std::string& joint, nb::handle times, nb::handle values,
-                    const std::string& interpolation);
+                    const std::string& interpolation, bool smooth);
   void torque_callable(const std::string& joint, nb::callable fn, nb::handle breakpoints,
                        nb::handle samples);
   void motion_table(const std::string& joint, nb::handle times, nb::handle values,

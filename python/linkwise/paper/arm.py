@@ -49,8 +49,9 @@ class Maneuver:
         times = np.linspace(0.0, _TABLE_END * DURATION, _TABLE_INTERVALS + 1)
         torques = _core.inverse_dynamics(model, *self.motion(times))
         for joint in model.joint_names:
+            # The paper's integrator knew no breakpoints, and the rows lie on one smooth curve.
             simulation.drive_torque_table(
-                joint, times, torques[:, model.v_slice(joint)], interpolation="cubic"
+                joint, times, torques[:, model.v_slice(joint)], interpolation="cubic", smooth=True
             )
 
 

@@ -21,6 +21,7 @@ class InverseDynamics {
         w_(model.n_bodies()) {}
 
   /// tau [nv] and loads [n_joints][6], either may be null. in.tau is not read; in.v null: resting.
+  /// What armatures of turning rates add to tau (forces/armature_bias.hpp) is the caller's.
   void evaluate(SweepInput<S> in, const S* du, S* tau, S* loads) {
     const Model& model = *model_;
     in.prescribed = du;

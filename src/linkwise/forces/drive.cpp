@@ -97,6 +97,7 @@ double largest_action(const Wrench& wrench) {
 }
 
 Breakpoints breakpoints(const Drive& drive, double tolerance, double largest) {
+  if (drive.smooth) return {};
   TableAction action;
   if (drive.kind != DriveKind::motion) action.least = rounding_share * largest;
   if (drive.kind == DriveKind::motion) {

@@ -29,6 +29,7 @@ struct Drive {
   DriveKind kind = DriveKind::free;
   std::vector<double> value;  ///< torque, or target of pd; one per degree of freedom
   std::optional<Table> table;
+  bool smooth = false;  ///< the table stands for one smooth curve: nowhere does its course change
   /// (t, q of the joint, v of the joint, out): torque of the joint.
   std::function<void(double, const double*, const double*, double*)> callable;
   /// (t, then out: coordinates of the joint and their two derivatives): a motion without a table.

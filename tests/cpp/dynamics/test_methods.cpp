@@ -5,6 +5,7 @@
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/inverse_dynamics.hpp"
+#include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise::testing {
@@ -103,6 +104,7 @@ TEST_P(Methods, ForwardUndoesInverse) {
   InverseDynamics<double> inverse(model);
   inverse.evaluate(c.input(), c.given.data(), tau.data(), loads.data());
   SweepInput<double> in = c.input();
+  add_armature_bias(model, in.v, 1, tau.data());
   in.tau = tau.data();
   for (const DynamicsOptions& options : all_options(model)) {
     const Motion6 got = evaluate(*make_dynamics(model, options), model, in);

@@ -114,7 +114,8 @@ def test_disk_that_is_full(linkwise, scenario, largest_file, size, said, left):
     largest_file(size)
     result = linkwise("run", path, "-o", "run.zarr")
     assert result.code == 1
-    assert f"output 'run.zarr': {said}; make room or choose another path" in result.complaint
+    where = os.path.abspath("run.zarr")
+    assert f"output {where!r}: {said}; make room or choose another path" in result.complaint
     assert os.path.exists("run.zarr") == left
     if left:
         assert open_run("run.zarr").sizes["time"] == 0
