@@ -30,8 +30,22 @@ nb::bytes to_bytes(const ModelSpec& spec) {
   return nb::bytes(bytes.data(), bytes.size());
 }
 
+/// InputError where Python could not read the text.
+void check_text(const std::string& text) {
+  const auto size = static_cast<Py_ssize_t>(text.size());
+  if (nb::steal(PyUnicode_DecodeUTF8(text.data(), size, nullptr))) return;
+  PyErr_Clear();
+  throw InputError("model data is damaged: a name is no UTF-8 text; write it again with to_bytes");
+}
+
 ModelSpec from_bytes(const nb::bytes& description) {
-  return deserialize(std::string(description.c_str(), description.size()));
+  ModelSpec spec = deserialize(std::string(description.c_str(), description.size()));
+  for (const std::string* text : {&spec.name, &spec.source, &spec.floating_joint})
+    check_text(*text);
+  for (const LinkSpec& link : spec.links) check_text(link.name);
+  for (const JointSpec& joint : spec.joints)
+    for (const std::string* text : {&joint.name, &joint.parent, &joint.child}) check_text(*text);
+  return spec;
 }
 
 using ModelClass = nb::class_<PyModel>;

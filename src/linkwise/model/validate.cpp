@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numbers>
 
 #include "linkwise/base/error.hpp"
@@ -175,9 +176,14 @@ void validate_joint(JointSpec& joint, const std::string& where) {
     if (!finite(a.axis)) throw InputError(head + "axis is not finite; give three finite numbers");
     const double largest = std::max({std::abs(a.axis.x), std::abs(a.axis.y), std::abs(a.axis.z)});
     if (largest == 0) throw InputError(head + "axis has zero length; give a nonzero axis");
-    a.axis = (1 / largest) *
-             a.axis;  // first, so that 1e200 and 1e-200 do not overflow or vanish when squared
-    a.axis = (1 / std::sqrt(dot(a.axis, a.axis))) * a.axis;
+    // What has unit length but for rounding stays as it is: a model made of a model's description
+    // is the same, bit by bit.
+    constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
+    if (largest > 2 || !(std::abs(dot(a.axis, a.axis) - 1) <= rounding)) {
+      a.axis = (1 / largest) *
+               a.axis;  // first, so that 1e200 and 1e-200 do not overflow or vanish when squared
+      a.axis = (1 / std::sqrt(dot(a.axis, a.axis))) * a.axis;
+    }
     if (!std::isfinite(a.pitch))
       throw InputError(head + "pitch is not finite; give the advance in m per rad");
   }
