@@ -30,9 +30,11 @@ BodyVelocities::BodyVelocities(const Model& model, const DynamicsOptions& option
       du_(model.nv()),
       v_(model.n_bodies()),
       gravity_(model.n_bodies()) {
-  if (has_armature_bias(model))
+  for (const Element& e : model.elements) {
+    if (e.prescribed || !has_armature_bias(model, e)) continue;
     throw InputError("state body_velocities takes no armatures" + model.where() +
                      " on floating, planar and spherical joints; use the state joint_rates");
+  }
 }
 
 void BodyVelocities::unpack(const double* v) {

@@ -8,6 +8,7 @@
 
 namespace linkwise {
 
+bool has_armature_bias(const Model& model, const Element& element);
 bool has_armature_bias(const Model& model);
 
 /// Adds factor times w x (D u) to tau [nv].

@@ -5,6 +5,7 @@
 #include "dynamics/dynamics_case.hpp"
 #include "linkwise/dynamics/batch.hpp"
 #include "linkwise/dynamics/inverse_dynamics.hpp"
+#include "linkwise/forces/armature_bias.hpp"
 
 namespace linkwise::testing {
 namespace {
@@ -62,6 +63,7 @@ TEST_P(Batch, EqualsOneByOne) {
       expect_close(row(du, nv, i), one, 1e-10, "accelerations");
       expect_close(row(w, n_load, i), loads, 1e-10, "loads");
       inverse.evaluate(c.input(), c.given.data(), one.data(), loads.data());
+      add_armature_bias(model, c.input().v, 1, one.data());
       expect_close(row(tau, nv, i), one, 1e-13, "torques");
       expect_close(row(w_inverse, n_load, i), loads, 1e-13, "loads of the inverse dynamics");
     }

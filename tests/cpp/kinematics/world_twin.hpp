@@ -188,7 +188,32 @@ class WorldTwin {
       for (const Vec3<double>& part : {in_frame, about_point})
         out.loads.insert(out.loads.end(), {part.x, part.y, part.z});
     }
+    add_turning_armatures(v, out.tau);
     return out;
+  }
+
+  /// w x (D u) of joints whose rates are components along axes that turn at w.
+  void add_turning_armatures(const std::vector<double>& v, std::vector<double>& tau) const {
+    const auto& D = model_.dof_values(DofProperty::armature);
+    const auto add = [&](int turned, const Vec3<double>& w) {  // the three rates from there on
+      const int i = turned;
+      const double p[3] = {D[i] * v[i], D[i + 1] * v[i + 1], D[i + 2] * v[i + 2]};
+      tau[i] += w.y * p[2] - w.z * p[1];
+      tau[i + 1] += w.z * p[0] - w.x * p[2];
+      tau[i + 2] += w.x * p[1] - w.y * p[0];
+    };
+    for (const Element& e : model_.elements) {
+      const int i = e.v;
+      if (e.kind == ElementKind::planar) {
+        tau[i] -= v[i + 2] * D[i + 1] * v[i + 1];
+        tau[i + 1] += v[i + 2] * D[i] * v[i];
+      } else if (e.kind == ElementKind::spherical) {
+        add(i, {v[i], v[i + 1], v[i + 2]});
+      } else if (e.kind == ElementKind::floating) {
+        add(i, {v[i + 3], v[i + 4], v[i + 5]});
+        add(i + 3, {v[i + 3], v[i + 4], v[i + 5]});
+      }
+    }
   }
 
   /// nv x nv, row-major, armature included; column by column from unit accelerations at rest.
