@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
@@ -29,13 +28,7 @@ BodyVelocities::BodyVelocities(const Model& model, const DynamicsOptions& option
       f_(system_.A().size()),
       du_(model.nv()),
       v_(model.n_bodies()),
-      gravity_(model.n_bodies()) {
-  for (const Element& e : model.elements) {
-    if (e.prescribed || !has_armature_bias(model, e)) continue;
-    throw InputError("state body_velocities takes no armatures" + model.where() +
-                     " on floating, planar and spherical joints; use the state joint_rates");
-  }
-}
+      gravity_(model.n_bodies()) {}
 
 void BodyVelocities::unpack(const double* v) {
   for (int n = 0; n < model_->n_bodies(); ++n) v_[n] = to_motion(v + 6 * n);

@@ -4,6 +4,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/evaluator.hpp"
+#include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/simulate/given_motion.hpp"
 
 namespace linkwise {
@@ -52,6 +53,11 @@ void Setup::settle() {
     throw InputError("state " + std::string(options.state->name) +
                      " takes no motion drives; use the state joint_rates for them");
   driven_ = driven_model(*model, drives);
+  for (const Element& e : driven().elements)
+    if (options.state && !e.prescribed && has_armature_bias(driven(), e))
+      throw InputError("state " + std::string(options.state->name) + " takes no armatures" +
+                       model->where() +
+                       " on floating, planar and spherical joints; use the state joint_rates");
   require_determined(driven());
   find_breakpoints();
   settled_ = true;
