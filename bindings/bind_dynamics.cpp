@@ -172,19 +172,9 @@ PyReport report_of(const ReportState& state) {
 using ForwardState = std::tuple<nb::object, nb::object, nb::object, ReportState>;
 
 void bind_results(nb::module_& m) {
-  nb::exception<NumericsError> numerics_error(m, "NumericsError", PyExc_RuntimeError);
-  numerics_error.attr("__module__") = "linkwise";
-  numerics_error.attr("__doc__") =
-      "A computation failed: one line with the method, the body and the remedy.";
-  nb::register_exception_translator(
-      [](const std::exception_ptr& thrown, void* type) {
-        try {
-          std::rethrow_exception(thrown);
-        } catch (const NumericsError& error) {
-          raise_printable(static_cast<PyObject*>(type), error.what());
-        }
-      },
-      numerics_error.ptr());
+  bind_exception<NumericsError>(
+      m, "NumericsError", PyExc_RuntimeError,
+      "A computation failed: one line with the method, the body and the remedy.");
   nb::class_<PyReport>(m, "Report", "How an evaluation went.")
       .def_prop_ro(
           "outcome", [](const PyReport& r) { return std::string(to_string(r.outcome)); },
@@ -273,55 +263,43 @@ Raises:
 }
 
 void bind_inverse(nb::module_& m) {
-  m.def(
+  const auto of_motion = [&](const char* name, auto function, const std::string& title,
+                             const std::string& returns) {
+    const std::string doc = title + R"( of a given motion, by the recursion of Newton and Euler [luh1980].
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
+        acceleration: dv/dt (..., nv) [rad/s2, m/s2], None: zero. Leading axes broadcast.
+    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
+        point, in its joint frame, force first; None: no wrench.
+    gravity: factor on the model's gravity, 0 leaves it out.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+)" + returns + R"(
+
+Raises:
+    InputError: shapes do not fit the model, or a number is not finite.)";
+    m.def(name, function, "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
+          "external"_a = nb::none(), "gravity"_a = 1.0, "threads"_a = nb::none(), doc.c_str());
+  };
+  of_motion(
       "inverse_dynamics",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
          double gravity, nb::handle threads) {
         return inverse_dynamics(self, q, v, a, external, gravity, threads, false);
       },
-      "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
-      "external"_a = nb::none(), "gravity"_a = 1.0, "threads"_a = nb::none(),
-      R"(Joint torques that a motion takes, by the recursion of Newton and Euler [luh1980].
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
-        acceleration: dv/dt (..., nv) [rad/s2, m/s2], None: zero. Leading axes broadcast.
-    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
-        point, in its joint frame, force first; None: no wrench.
-    gravity: factor on the model's gravity, 0 leaves it out.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    tau (..., nv) [N m, N], the torque of the rotors (armature) included. It is the total: less
-    passive_torque it is what the drives give.
-
-Raises:
-    InputError: shapes do not fit the model, or a number is not finite.)");
-  m.def(
+      "Joint torques",
+      R"(    tau (..., nv) [N m, N], the torque of the rotors (armature) included. It is the total: less
+    passive_torque it is what the drives give.)");
+  of_motion(
       "inverse_dynamics_loads",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
          double gravity, nb::handle threads) {
         return inverse_dynamics(self, q, v, a, external, gravity, threads, true);
       },
-      "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
-      "external"_a = nb::none(), "gravity"_a = 1.0, "threads"_a = nb::none(),
-      R"(Joint loads of a given motion, by the recursion of Newton and Euler [luh1980].
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
-        acceleration: dv/dt (..., nv) [rad/s2, m/s2], None: zero. Leading axes broadcast.
-    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
-        point, in its joint frame, force first; None: no wrench.
-    gravity: factor on the model's gravity, 0 leaves it out.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (..., n_joints, 6) [N, N m]: as of joint_loads.
-
-Raises:
-    InputError: shapes do not fit the model, or a number is not finite.)");
+      "Joint loads", "    (..., n_joints, 6) [N, N m]: as of joint_loads.");
   m.def("joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
         nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
         "solver"_a = "auto", "threads"_a = nb::none(),

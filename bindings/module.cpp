@@ -16,19 +16,9 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
 
   m.attr("cpu_target") = LINKWISE_CPU_TARGET;
   m.attr("lanes") = LINKWISE_LANES;
-  nb::exception<linkwise::InputError> input_error(m, "InputError", PyExc_ValueError);
-  input_error.attr("__module__") = "linkwise";
-  input_error.attr("__doc__") =
-      "What was given cannot be used: one line with the element and the remedy.";
-  nb::register_exception_translator(
-      [](const std::exception_ptr& thrown, void* type) {
-        try {
-          std::rethrow_exception(thrown);
-        } catch (const linkwise::InputError& error) {
-          linkwise::bindings::raise_printable(static_cast<PyObject*>(type), error.what());
-        }
-      },
-      input_error.ptr());
+  linkwise::bindings::bind_exception<linkwise::InputError>(
+      m, "InputError", PyExc_ValueError,
+      "What was given cannot be used: one line with the element and the remedy.");
   m.def(
       "as_floats",
       [](nb::handle values, const std::string& name) {

@@ -1,6 +1,7 @@
 #pragma once
 // What a message holds may come from a file of somebody else, and ends on a terminal.
-#include <Python.h>
+#include <nanobind/nanobind.h>
+
 #include <string>
 #include <string_view>
 
@@ -33,6 +34,23 @@ inline void raise_printable(PyObject* type, const char* message) {
   if (!text) return;
   PyErr_SetObject(type, text);
   Py_DECREF(text);
+}
+
+/// Makes a Python exception of the C++ class Error, whose messages are printed as users may see them.
+template <class Error>
+void bind_exception(nanobind::module_& m, const char* name, PyObject* base, const char* doc) {
+  nanobind::exception<Error> bound(m, name, base);
+  bound.attr("__module__") = "linkwise";
+  bound.attr("__doc__") = doc;
+  nanobind::register_exception_translator(
+      [](const std::exception_ptr& thrown, void* type) {
+        try {
+          std::rethrow_exception(thrown);
+        } catch (const Error& error) {
+          raise_printable(static_cast<PyObject*>(type), error.what());
+        }
+      },
+      bound.ptr());
 }
 
 }  // namespace linkwise::bindings
