@@ -265,7 +265,8 @@ Raises:
 void bind_inverse(nb::module_& m) {
   const auto of_motion = [&](const char* name, auto function, const std::string& title,
                              const std::string& returns) {
-    const std::string doc = title + R"( of a given motion, by the recursion of Newton and Euler [luh1980].
+    const std::string doc = title +
+                            R"( of a given motion, by the recursion of Newton and Euler [luh1980].
 
 Args:
     model: the machine.

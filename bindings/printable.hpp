@@ -1,9 +1,9 @@
 #pragma once
 // What a message holds may come from a file of somebody else, and ends on a terminal.
-#include <nanobind/nanobind.h>
-
 #include <string>
 #include <string_view>
+
+#include <nanobind/nanobind.h>
 
 namespace linkwise::bindings {
 
@@ -36,7 +36,8 @@ inline void raise_printable(PyObject* type, const char* message) {
   Py_DECREF(text);
 }
 
-/// Makes a Python exception of the C++ class Error, whose messages are printed as users may see them.
+/// Makes a Python exception of the C++ class Error, whose messages are printed as users may see
+/// them.
 template <class Error>
 void bind_exception(nanobind::module_& m, const char* name, PyObject* base, const char* doc) {
   nanobind::exception<Error> bound(m, name, base);
