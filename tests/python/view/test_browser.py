@@ -52,9 +52,9 @@ def wait_for(page, holds, what):
     raise AssertionError(f"after {PATIENCE} s: not {what}; {drawn(image)} pixels drawn")
 
 
-# Several pictures drawn: on a slow machine half a second may pass without any.
+# As many pictures drawn as half a second takes where nothing holds them up.
 NEW_PICTURES = """() => new Promise(done => {
-  let left = 4;
+  let left = 30;
   const next = () => left-- ? requestAnimationFrame(next) : done();
   next();
 })"""
@@ -65,7 +65,6 @@ def still(page):
     before = wait_for(page, lambda image: drawn(image) > 300, "drawn")
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
-        time.sleep(0.5)
         page.evaluate(NEW_PICTURES)
         image = picture(page)
         if np.abs(image - before).max() < 0.02:
