@@ -80,6 +80,18 @@ def velocity_from_mujoco(
     return v
 
 
+def velocity_to_mujoco(model: Model, mj_model: Any, qpos: npt.ArrayLike, v: npt.ArrayLike) -> Array:
+    """MuJoCo's qvel (mj_model.nv,) of linkwise's v (nv,), with the position as MuJoCo's qpos."""
+    positions, source = _vector(qpos, mj_model.nq, "qpos"), _vector(v, model.nv, "v")
+    qvel = np.zeros(mj_model.nv)
+    for name, kind, where, theirs in _joints(mj_model):
+        values = source[model.v_slice(name)].copy()
+        if kind == "floating":
+            values[:3] = rotation(positions[where][3:]) @ values[:3]
+        qvel[theirs] = values
+    return qvel
+
+
 def acceleration_from_mujoco(
     model: Model,
     mj_model: Any,
