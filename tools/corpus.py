@@ -4,8 +4,9 @@
     python tools/corpus.py [FOLDER ...] [--json FILE]
 
 At a random state of each machine that loads, our mass matrix is compared with Pinocchio's (URDF,
-mimic joints independent) or MuJoCo's (MJCF). Prints how many load and agree, and each refusal with
-its reason. It belongs to no test: what is installed differs.
+mimic joints independent, machines without a moving joint on a floating base) or MuJoCo's (MJCF).
+Prints how many load and agree, and each refusal with its reason. It belongs to no
+test: what is installed differs.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ import json
 import re
 import sys
 import sysconfig
+import warnings
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -52,13 +55,23 @@ def of_urdf(path: Path, rng: np.random.Generator) -> tuple[str, float | None, st
     try:
         import pinocchio as pin
 
-        theirs = pin.buildModelFromUrdf(str(path))
+        if model.nv == 0:  # one body: let it float
+            options = {"mimic": "independent", "joint_order": "pinocchio"}
+            try:
+                model = lw.load(path, floating_base=True, **options)
+            except lw.InputError as error:
+                return "loads, no witness", None, str(error)
+            theirs = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
+        else:
+            theirs = pin.buildModelFromUrdf(str(path))
     except Exception as error:
         return "loads, no witness", None, f"Pinocchio: {error}"
     if theirs.nv != model.nv or model.nv == 0 or model.nv > MOST_FREEDOMS:
         return "loads, no witness", None, f"{model.nv} degrees of freedom, {theirs.nv} in Pinocchio"
     q, qp = model.neutral_configuration(), pin.neutral(theirs)
     for name in model.joint_names:
+        if name == "root_joint":
+            continue  # its mass matrix is the same everywhere
         joint = theirs.joints[theirs.getJointId(name)]
         angle = rng.uniform(-1, 1)
         if joint.nv != 1:
@@ -115,6 +128,11 @@ def main() -> int:
     parser.add_argument("folders", nargs="*", type=Path)
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
+    warnings.simplefilter("ignore", lw.ModelWarning)  # what is ignored shows in the comparison
+    with suppress(ImportError):  # what MuJoCo warns of would go to a file in the current folder
+        import mujoco
+
+        mujoco.set_mju_user_warning(lambda message: None)
     folders = given.folders or [Path(sysconfig.get_paths()["purelib"])]
     rng = np.random.default_rng(0)
     rows = []

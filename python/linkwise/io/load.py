@@ -12,8 +12,6 @@ import numpy.typing as npt
 
 from linkwise._core import InputError, Model, as_floats
 from linkwise.io.complaint import complain, shorten
-from linkwise.io.encoding import decode_xml
-from linkwise.io.files import MODEL_BYTES, read_bytes
 from linkwise.io.urdf import JointOrder, Mimic, read_urdf
 from linkwise.io.xml import local_name, parse_xml
 from linkwise.notes import tell, warnings_of
@@ -92,13 +90,11 @@ def load(
         return model
     if kind == "mujoco":
         from linkwise.io.mjcf import read_mjcf
+        from linkwise.io.mjcf_files import require_utf8
         from linkwise.io.mjcf_limits import check_mjcf
 
         if xml is None:
-            encoding = decode_xml(read_bytes(path, "model file", MODEL_BYTES), path)[1]
-            if encoding not in ("utf-8", "ascii"):
-                problem = f"is written in {encoding}, and MuJoCo reads UTF-8 alone"
-                complain(path, "model file", problem, "save it as UTF-8")
+            require_utf8(path)
         check_mjcf(path, root)
         if floating_base:
             complain(

@@ -1,7 +1,7 @@
 """What an MJCF may ask of MuJoCo's compiler, which opens and allocates whatever the file says.
 
-Checked before it sees the file: no other model files, and bounds on everything that a short file
-can make large.
+Checked before it sees the file, and the model files that this one names: bounds on everything that
+a short file can make large.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import NoReturn
 from lxml import etree
 
 from linkwise.io.complaint import complain, shorten
+from linkwise.io.mjcf_files import ModelFiles, read_model_files
 from linkwise.io.xml import local_name
 
 MOST_ELEMENTS = 20_000
@@ -24,7 +25,6 @@ MOST_CELLS = 2**27
 MOST_ASSET_BYTES = 2**28
 """Meshes, height fields, skins and textures together."""
 
-_OTHER_MODELS = {"include": "a file that is included", "model": "a model in a file of its own"}
 _COPIES = {"replicate": ("count",), "composite": ("count",), "flexcomp": ("count", "cellcount")}
 _ASSETS = ("mesh", "hfield", "skin", "texture", "flexcomp")
 _MOST_PER_ELEMENT = 1000  # user numbers, delay samples and dimensions: every element has them
@@ -33,46 +33,61 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def check_mjcf(path: str | os.PathLike[str], root: etree._Element) -> None:
-    """Raise InputError where the compiler would read other models or could exhaust the memory."""
-    _Check(path, root).run()
+    """Raise InputError where the compiler could exhaust the memory, or would read what it must not.
+
+    The model files that this one names are read and checked as it is.
+    """
+    _Check(read_model_files(path, root)).run()
 
 
 class _Check:
-    def __init__(self, path: str | os.PathLike[str], root: etree._Element) -> None:
-        self.path, self.root = path, root
-        self.folders = [Path(path).resolve().parent]
-        for compiler in root.iter("compiler"):
-            for key in ("meshdir", "texturedir", "assetdir"):
-                self.folders.append(self.folders[0] / compiler.get(key, ""))
+    def __init__(self, files: ModelFiles, times: float = 1.0) -> None:
+        """times: how often the model is attached."""
+        self.files, self.times = files, times
+        self.folders = [Path(path).resolve().parent for path, _ in files.documents]
+        for _, root in files.documents:
+            for compiler in root.iter("compiler"):
+                for key in ("meshdir", "texturedir", "assetdir"):
+                    self.folders.append(self.folders[0] / compiler.get(key, ""))
         self.cells = 0.0
         self.asset_bytes = 0
+        self.attaches = 0.0
 
-    def run(self) -> None:
-        if self._count(self.root) > MOST_ELEMENTS:
+    def run(self) -> float:
+        """Elements of the model once all are replicated."""
+        elements = self._count(self.files.root)
+        largest = 0.0
+        for attached in self.files.attached:
+            check = _Check(attached, max(1.0, self.attaches * self.times))
+            check.cells, check.asset_bytes = self.cells, self.asset_bytes
+            largest = max(largest, check.run())
+            self.cells, self.asset_bytes = check.cells, check.asset_bytes
+        elements += self.attaches * largest
+        if elements > MOST_ELEMENTS:
             self._complain(
-                self.root,
+                self.files.root,
                 f"has more than {MOST_ELEMENTS} elements once all are replicated",
                 "build very large models with linkwise.ModelBuilder or linkwise.scenes",
             )
-        for element in self.root.iter(etree.Element):
-            self._check_numbers(element)
-            if local_name(element) in _ASSETS:
-                for key, value in element.attrib.items():
-                    if str(key).startswith("file"):
-                        self._check_file(element, str(value))
+        for _, root in self.files.documents:
+            for element in root.iter(etree.Element):
+                self._check_numbers(element)
+                if local_name(element) in _ASSETS:
+                    for key, value in element.attrib.items():
+                        if str(key).startswith("file"):
+                            self._check_file(element, str(value))
+        return elements
 
-    def _count(self, element: etree._Element) -> float:
+    def _count(self, element: etree._Element, times: float = 1.0) -> float:
         """Elements from this one down; replicated ones count as often as they will exist."""
         name = local_name(element)
-        if name in _OTHER_MODELS and (name == "include" or element.get("file") is not None):
-            self._complain(
-                element,
-                f"{_OTHER_MODELS[name]} is not read",
-                "let MuJoCo write one file: mujoco.mj_saveLastXML('flat.xml', "
-                "mujoco.MjModel.from_xml_path(FILE))",
-            )
-        below = sum(self._count(child) for child in element.iterchildren(etree.Element))
         copies = math.prod(self._numbers(element, key) for key in _COPIES.get(name, ()))
+        self.attaches += times * (name == "attach")
+        below = sum(
+            self._count(child, times * copies)
+            for parent in (element, *self.files.included.get(element, ()))
+            for child in parent.iterchildren(etree.Element)
+        )
         return float(copies) * (1 + below) if name in _COPIES else 1 + below
 
     def _numbers(self, element: etree._Element, key: str) -> float:
@@ -88,7 +103,12 @@ class _Check:
     def _default(self, name: str, key: str) -> float:
         """The largest value that a class of defaults may give to this attribute."""
         return max(
-            (self._numbers(e, key) for d in self.root.iter("default") for e in d.iter(name)),
+            (
+                self._numbers(element, key)
+                for _, root in self.files.documents
+                for default in root.iter("default")
+                for element in default.iter(name)
+            ),
             default=1.0,
         )
 
@@ -116,7 +136,7 @@ class _Check:
                 )
 
     def _add_cells(self, element: etree._Element, cells: float) -> None:
-        self.cells += cells
+        self.cells += cells * self.times
         if self.cells > MOST_CELLS:
             self._complain(
                 element,
@@ -148,7 +168,8 @@ class _Check:
 
     def _complain(self, element: etree._Element, problem: str, remedy: str) -> NoReturn:
         name = shorten(local_name(element))
-        complain(self.path, f"element '{name}'", problem, remedy, element.sourceline)
+        path = self.files.path_of(element)
+        complain(path, f"element '{name}'", problem, remedy, element.sourceline)
 
 
 def _picture_size(file: Path) -> int:

@@ -25,7 +25,8 @@ def parse_number(text: str) -> float:
     if not _NUMBER.match(stripped):
         if _NOT_FINITE.match(stripped):
             raise ValueError(f"'{shorten(stripped)}' is not a finite number")
-        raise ValueError(f"'{shorten(stripped)}' is not a number")
+        comma = ", which has a comma: points mark decimals, blanks separate numbers"
+        raise ValueError(f"'{shorten(stripped)}' is not a number{comma if ',' in stripped else ''}")
     value = float(stripped)
     if math.isinf(value):
         raise ValueError(f"'{shorten(stripped)}' is too large for a double")

@@ -236,7 +236,8 @@ void append_dof_properties(const JointSpec& joint, const std::string& where,
     const double lower = at(DofProperty::lower, i), upper = at(DofProperty::upper, i);
     if (lower > upper)
       throw InputError(head + "lower limit " + number_text(lower) + " is above the upper limit " +
-                       number_text(upper) + "; swap them");
+                       number_text(upper) +
+                       "; swap them, or leave both out where there is no limit");
     if (at(DofProperty::friction, i) > 0 && at(DofProperty::friction_velocity, i) == 0)
       throw InputError(
           head + "friction_velocity is zero; give the speed below which friction is smoothed");

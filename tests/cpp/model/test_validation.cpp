@@ -188,7 +188,8 @@ const Wrong wrong_properties[] = {
        set_dof(s, 0, DofProperty::lower, {1});
        set_dof(s, 0, DofProperty::upper, {-1});
      },
-     "joint 'shoulder' of arm.urdf: lower limit 1 is above the upper limit -1; swap them"},
+     "joint 'shoulder' of arm.urdf: lower limit 1 is above the upper limit -1; swap them, or "
+     "leave both out where there is no limit"},
     {"friction_not_smooth",
      [](ModelSpec& s) {
        set_dof(s, 0, DofProperty::friction, {1});

@@ -240,11 +240,6 @@ def test_defect_is_named(write, complaint, capfd, monkeypatch, tmp_path, text, e
 
 
 LARGE = [
-    ('<include file="other.xml"/>', ":2: element 'include': a file that is included is not read; "),
-    (
-        '<asset><model name="m" file="other.xml"/></asset>',
-        ":2: element 'model': a model in a file of its own is not read; let MuJoCo",
-    ),
     (
         '<worldbody><replicate count="1000"><replicate count="1000"><body><geom size="1"/></body>'
         "</replicate></replicate></worldbody>",
@@ -295,7 +290,6 @@ def test_what_would_read_elsewhere_or_exhaust_the_memory_is_refused(
         raise AssertionError("reached MuJoCo's compiler")
 
     monkeypatch.setattr("linkwise.io.mjcf.compile_mjcf", compile_it)
-    (tmp_path / "other.xml").write_text("<mujoco/>")
     header = b"\x89PNG\r\n\x1a\n" + bytes([0, 0, 0, 13]) + b"IHDR"
     (tmp_path / "bomb.png").write_bytes(header + (100_000).to_bytes(4, "big") * 2)
     with open(tmp_path / "heavy.stl", "wb") as sparse:

@@ -180,7 +180,8 @@ REPLACED = [
     pytest.param(
         'lower="-1" upper="2"',
         'lower="2" upper="-1"',
-        ":23: joint 'shoulder': lower limit 2 is above the upper limit -1; swap them",
+        ":23: joint 'shoulder': lower limit 2 is above the upper limit -1; swap them, or "
+        "leave both out where there is no limit",
         id="limits reversed",
     ),
     pytest.param(
