@@ -16,7 +16,7 @@ namespace {
 
 struct ForwardResult {
   nb::object acceleration, joint_load, constraint_force;
-  PyReport report;
+  EvaluationReport report;
 };
 
 /// What to return: accelerations alone, with joint loads, or everything.
@@ -34,7 +34,7 @@ DynamicsOptions options_of(const std::string& method, const std::string& solver,
   if (!tolerance.is_none()) o.tolerance = real_number(tolerance, "tolerance");
   if (!stop.is_none()) o.stop = stop_rule_from_name(nb::cast<std::string>(stop));
   if (const auto most = whole_number(max_iterations, "max_iterations")) o.max_iterations = *most;
-  read_solver_options(solver_options, options);
+  set_options(o, solver_option_values(solver_options));
   return options;
 }
 
@@ -69,7 +69,7 @@ nb::object forward_dynamics(const PyModel& self, const States& s, bool passive, 
     if (!report.ok()) throw NumericsError(failure_text(m, report));
     return with_loads ? loads->array : du.array;
   }
-  ForwardResult result{du.array, loads->array, nb::none(), {m, std::move(report)}};
+  ForwardResult result{du.array, loads->array, nb::none(), std::move(report)};
   if (!force.empty()) {
     NewArray f(s.lead, {force.size() / s.count});
     std::copy(force.begin(), force.end(), f.data);
@@ -149,7 +149,7 @@ nb::list integrator_list() {
 using ReportState =
     std::tuple<int, std::string, std::string, std::string, int, std::string, int, double>;
 
-ReportState state_of(const PyReport& r) {
+ReportState state_of(const EvaluationReport& r) {
   return {static_cast<int>(r.outcome),
           r.choice.method,
           r.choice.solver,
@@ -160,8 +160,8 @@ ReportState state_of(const PyReport& r) {
           r.error_estimate};
 }
 
-PyReport report_of(const ReportState& state) {
-  PyReport r;
+EvaluationReport report_of(const ReportState& state) {
+  EvaluationReport r;
   int outcome = 0;
   std::tie(outcome, r.choice.method, r.choice.solver, r.choice.reason, r.body, r.body_name,
            r.iterations, r.error_estimate) = state;
@@ -175,28 +175,30 @@ void bind_results(nb::module_& m) {
   bind_exception<NumericsError>(
       m, "NumericsError", PyExc_RuntimeError,
       "A computation failed: one line with the method, the body and the remedy.");
-  nb::class_<PyReport>(m, "Report", "How an evaluation went.")
+  nb::class_<EvaluationReport>(m, "Report", "How an evaluation went.")
       .def_prop_ro(
-          "outcome", [](const PyReport& r) { return std::string(to_string(r.outcome)); },
+          "outcome", [](const EvaluationReport& r) { return std::string(to_string(r.outcome)); },
           "\"converged\", or what went wrong in the worst of the states.")
       .def_prop_ro(
-          "method", [](const PyReport& r) { return r.choice.method; },
+          "method", [](const EvaluationReport& r) { return r.choice.method; },
           "The name of the method that computed it.")
       .def_prop_ro(
-          "solver", [](const PyReport& r) { return r.choice.solver; },
+          "solver", [](const EvaluationReport& r) { return r.choice.solver; },
           "The name of the linear solver; empty where the method uses none.")
       .def_prop_ro(
-          "reason", [](const PyReport& r) { return r.choice.reason; },
+          "reason", [](const EvaluationReport& r) { return r.choice.reason; },
           "Why this method and solver.")
-      .def_ro("body", &PyReport::body_name, "Where it failed, or empty.")
-      .def_ro("iterations", &PyReport::iterations,
+      .def_ro("body", &EvaluationReport::body_name, "Where it failed, or empty.")
+      .def_ro("iterations", &EvaluationReport::iterations,
               "Iterations of the linear solver; 0 of a direct one.")
-      .def_ro("error_estimate", &PyReport::error_estimate,
+      .def_ro("error_estimate", &EvaluationReport::error_estimate,
               "Estimated error of the constraint forces in the A-norm, relative to them.")
       .def("__getstate__", &state_of)
       .def("__setstate__",
-           [](PyReport& r, const ReportState& state) { new (&r) PyReport(report_of(state)); })
-      .def("__repr__", [](const PyReport& r) {
+           [](EvaluationReport& r, const ReportState& state) {
+             new (&r) EvaluationReport(report_of(state));
+           })
+      .def("__repr__", [](const EvaluationReport& r) {
         return "Report(" + std::string(to_string(r.outcome)) + ", method " + r.choice.method +
                (r.choice.solver.empty() ? "" : ", solver " + r.choice.solver) + ", " +
                std::to_string(r.iterations) + " iterations)";

@@ -79,10 +79,7 @@ SimulationOptions options_of(const nb::kwargs& given) {
           find_numerics(name).member);
     }
   }
-  SimulationOptions options = simulation_options(numerics, executor_for(threads));
-  read_solver_options(solver_options, options.dynamics);
-  options.follow_error_test &= !gives_tolerance(solver_options);
-  return options;
+  return simulation_options(numerics, executor_for(threads), solver_option_values(solver_options));
 }
 
 nb::list numerics_list() {
@@ -92,6 +89,10 @@ nb::list numerics_list() {
     nb::dict row;
     row["name"] = std::string(entry.name);
     std::visit([&](auto member) { row["default"] = nb::cast(defaults.*member); }, entry.member);
+    row["units"] = std::string(entry.units);
+    row["kind"] = entry.member.index() < 2    ? "number"
+                  : entry.member.index() == 2 ? "count"
+                                              : "name";
     row["description"] = std::string(entry.description);
     out.append(row);
   }
@@ -124,6 +125,7 @@ void bind_ending(nb::module_& m) {
   nb::class_<Ending>(m, "Ending", "How a simulation ended, or that it goes on (converged).")
       .def_prop_ro("outcome", [](const Ending& e) { return std::string(to_string(e.outcome)); })
       .def_ro("time", &Ending::time, "The time that was reached, s.")
+      .def_ro("joint", &Ending::joint, "Where it failed, or empty.")
       .def_ro("text", &Ending::text, "What happened and what to do about it, or empty.");
   nb::class_<SimulationStatistics>(m, "SimulationStatistics", "Since the start.")
       .def_ro("steps", &SimulationStatistics::steps)
@@ -175,13 +177,9 @@ void bind_simulation(nb::module_& m) {
            "(time, ...) of\n"
            "the wanted quantities. Fewer where the simulation ends before: see ending.")
       .def_prop_ro("ending", [](const PySimulation& s) { return s.simulation.ending(); })
-      .def_prop_ro(
-          "stop_joint",
-          [](const PySimulation& s) {
-            const int joint = s.simulation.ending().joint;
-            return joint < 0 ? std::string() : s.model->joints[joint].name;
-          },
-          "The joint where it failed, or empty.")
+      .def(
+          "interrupt", [](PySimulation& s) { s.simulation.stop(Outcome::interrupted); },
+          "End what still runs.")
       .def_prop_ro("statistics", [](const PySimulation& s) { return s.simulation.statistics(); })
       .def(
           "keep_trace",
@@ -212,7 +210,8 @@ void bind_simulation(nb::module_& m) {
                    [](const PySimulation& s) { return s.simulation.setup().choice.reason; });
   bind_drives(simulation);
   m.def("numerics", &numerics_list,
-        "The options of Simulation, as dictionaries of name, default and description.");
+        "The options of Simulation, as dictionaries of name, default, units, kind (number, count, "
+        "name) and description.");
   m.def("quantities", &quantity_list, "The table of recorded quantities, as dictionaries.");
 }
 

@@ -71,10 +71,6 @@ struct StateRows {
   }
 };
 
-PyReport to_python(const Model& m, const Choice& choice, const Report& r, int body) {
-  return {m, {r.outcome, choice, body, r.iterations, r.error_estimate}};
-}
-
 /// A f = b of a model at one state. Holds its own copy of the state.
 class PyConstraintSystem {
  public:
@@ -139,7 +135,7 @@ class PyConstraintSystem {
     options.solver_options.tolerance = tolerance;
     options.solver_options.stop = stop_rule_from_name(stop);
     options.solver_options.max_iterations = max_iterations;
-    read_solver_options(solver_options, options);
+    set_options(options.solver_options, solver_option_values(solver_options));
     const auto made = make_solver(solver, options.solver_options);
     std::vector<double> f =
         guess.is_none() ? std::vector<double>(A().size()) : unknowns(guess, "guess");
@@ -150,7 +146,7 @@ class PyConstraintSystem {
     }
     const Choice choice{"constraint_force", solver, "as asked for"};
     const int body = report.node >= 0 ? system_.body_of_node(report.node) : -1;
-    return nb::make_tuple(to_numpy(f), to_python(*model_, choice, report, body));
+    return nb::make_tuple(to_numpy(f), evaluation_report(*model_, choice, {report, body}));
   }
 
   nb::tuple recover(nb::handle f) {
@@ -281,7 +277,7 @@ class PyDynamicsMethod {
       report = method_->evaluate(t, rows.input(m, 0), du.data, loads.data);
       if (accept && report.ok()) method_->accepted(t);
     }
-    return nb::make_tuple(du.array, loads.array, to_python(m, choice_, report, report.body));
+    return nb::make_tuple(du.array, loads.array, evaluation_report(m, choice_, report));
   }
 
   nb::dict follow(nb::handle times, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
@@ -474,7 +470,7 @@ void make_method(PyDynamicsMethod* self, const PyModel& model, const std::string
   options.solver_options.tolerance = tolerance;
   options.solver_options.stop = stop_rule_from_name(stop);
   options.solver_options.max_iterations = max_iterations;
-  read_solver_options(solver_options, options);
+  set_options(options.solver_options, solver_option_values(solver_options));
   new (self) PyDynamicsMethod(model, std::move(options));
 }
 

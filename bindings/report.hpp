@@ -12,15 +12,6 @@ struct NumericsError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A report, and the name of the body at which it failed.
-struct PyReport : EvaluationReport {
-  std::string body_name;
-
-  PyReport() = default;
-  PyReport(const Model& model, EvaluationReport report)
-      : EvaluationReport(std::move(report)), body_name(body < 0 ? "" : model.body_name(body)) {}
-};
-
 /// NumericsError unless a result holds numbers alone.
 inline void check_result(const double* data, size_t n) {
   if (!is_finite(data, n))

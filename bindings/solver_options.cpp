@@ -28,21 +28,16 @@ OptionValue to_value(const Option& option, nb::handle value) {
 
 }  // namespace
 
-void read_solver_options(nb::handle given, DynamicsOptions& options) {
-  if (given.is_none()) return;
+SolverOptionValues solver_option_values(nb::handle given) {
+  SolverOptionValues values;
+  if (given.is_none()) return values;
   if (!nb::isinstance<nb::dict>(given))
     throw InputError("solver_options is not a dictionary; give e.g. {'omega': 1.5}");
   for (auto [key, value] : nb::cast<nb::dict>(given)) {
     const std::string name = nb::cast<std::string>(nb::str(key));
-    options.solver_options.set(name, to_value(find_option(name), value));
+    values.emplace_back(name, to_value(find_option(name), value));
   }
-  validate(options.solver_options);
-}
-
-bool gives_tolerance(nb::handle given) {
-  if (!nb::isinstance<nb::dict>(given)) return false;
-  const auto options = nb::cast<nb::dict>(given);
-  return options.contains("tolerance") || options.contains("absolute_tolerance");
+  return values;
 }
 
 nb::list solver_option_list() {

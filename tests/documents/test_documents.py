@@ -119,3 +119,5 @@ def test_documents_name_what_the_tables_of_the_core_hold():
     assert f"`{groups}`" in texts["input"]
     for row in lw.quantities():
         assert f"`{row['name']}`" in texts["results"], row["name"]
+    for row in lw.numerics():
+        assert f"`{row['name']}`" in texts["input"].replace("[simulate] ", ""), row["name"]

@@ -7,10 +7,19 @@ checked in :mod:`linkwise.scenario.arguments`, once the model is loaded.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    create_model,
+    model_validator,
+)
 
+from linkwise._core import numerics
 from linkwise.io.complaint import shorten
 from linkwise.io.units import check_dimension, parse_quantity
 
@@ -257,23 +266,33 @@ class RatingSection(Section):
     drive_power: Annotated[Number, Field(gt=0)] | None = None
 
 
-class SimulateSection(Section):
-    """Options of linkwise.simulate and of its Numerics, where their defaults are."""
-
+class _SimulateSection(Section):
     duration: Time
-    tolerance: Annotated[Number, Field(gt=0)] | None = None
-    step_tolerance: Annotated[Number, Field(gt=0)] | None = None
-    integrator: str | None = None
-    method: str | None = None
-    solver: str | None = None
-    initial_guess: str | None = None
-    stop: str | None = None
-    solver_tolerance: Annotated[Number, Field(gt=0)] | None = None
-    max_iterations: Count | None = None
-    step: Time | None = None
-    max_step: Time | None = None
-    max_steps: Count | None = None
     threads: Count | None = None
+
+
+#: The type of an option by its kind in the core's table.
+_KINDS: dict[str, Any] = {
+    "number": Annotated[Number, Field(gt=0)],
+    "count": Count,
+    "name": str,
+}
+
+if TYPE_CHECKING:
+    SimulateSection = _SimulateSection
+else:
+    #: Options of linkwise.simulate and of its Numerics, where their defaults are.
+    SimulateSection = create_model(
+        "SimulateSection",
+        __base__=_SimulateSection,
+        **{
+            row["name"]: (
+                (Time if row["units"] == "s" else _KINDS[row["kind"]]) | None,
+                Field(default=None, description=row["description"]),
+            )
+            for row in numerics()
+        },
+    )
 
 
 class OutputSection(Section):

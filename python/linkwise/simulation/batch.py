@@ -94,6 +94,8 @@ def _dataset(
     ends = {
         "outcome": (dims, np.array([e.outcome for e in endings], dtype=np.str_).reshape(lead)),
         "stop_time": (dims, np.array([e.time for e in endings]).reshape(lead), {"units": "s"}),
+        "stop_joint": (dims, np.array([e.joint for e in endings], dtype=np.str_).reshape(lead)),
+        "message": (dims, np.array([e.text for e in endings], dtype=np.str_).reshape(lead)),
     }
     return xr.Dataset(
         data, coords={"time": ("time", times, dict(TIME_ATTRS)), **coordinates, **ends}
@@ -139,7 +141,8 @@ def simulate_batch(
     Returns:
         The variables of a run with the members' axes in front: `model` where several are given,
         then `member`, or `member_1`, `member_2`, ... A member that cannot go on ends alone: its
-        `outcome` says why, `stop_time` when, and its later samples are NaN.
+        `outcome` and `message` say why, `stop_time` when, `stop_joint` where, and its later samples
+            are NaN.
 
     Raises:
         InputError: an argument is wrong; nothing was simulated.

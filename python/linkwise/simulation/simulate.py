@@ -33,10 +33,10 @@ from linkwise.simulation.arguments import (
 )
 from linkwise.simulation.numerics import DEFAULTS, Numerics
 from linkwise.simulation.recording import Recording
-from linkwise.simulation.time_loop import Ending, Progress, run_time_loop
+from linkwise.simulation.time_loop import Progress, run_time_loop
 
 if TYPE_CHECKING:
-    from linkwise._core import Model, Simulation
+    from linkwise._core import Ending, Model, Simulation
     from linkwise.drives import Drive, Wrench
 
 
@@ -162,27 +162,28 @@ def _record(
         with contextlib.suppress(Exception):
             record.finish(said)
         raise
-    finished = record.finish(_attributes_at_end(ending, clock.monotonic() - started))
+    finished = record.finish(_attributes_at_end(simulation, clock.monotonic() - started))
     return Run(finished, record.path, model), ending
 
 
-def _attributes_at_end(ending: Ending, wall_time: float) -> dict[str, Any]:
+def _attributes_at_end(simulation: Simulation, wall_time: float) -> dict[str, Any]:
+    ending, done = simulation.ending, simulation.statistics
     return {
         "outcome": ending.outcome,
-        "message": ending.message,
+        "message": ending.text,
         "stop_time": ending.time,
         "stop_joint": ending.joint,
         "wall_time": wall_time,
-        "total_steps": ending.counters["steps"],
-        "total_evaluations": ending.counters["evaluations"],
-        "total_iterations": ending.counters["iterations"],
+        "total_steps": done.steps,
+        "total_evaluations": done.evaluations,
+        "total_iterations": done.iterations,
     }
 
 
 def failure_message(model: Model, ending: Ending) -> str:
     """One line: what happened, when, where, and (from the core) what to do."""
     joint = f", joint {ending.joint!r}" if ending.joint else ""
-    detail = f": {ending.message}" if ending.message else ""
+    detail = f": {ending.text}" if ending.text else ""
     return (
         f"simulation of {model.name!r} stopped at t = {ending.time:.6g} s with outcome "
         f"{ending.outcome}{joint}{detail}"
@@ -306,6 +307,6 @@ def raise_failure(model: Model, ending: Ending, run: Run) -> None:
     """Raise the error that belongs to a run that did not reach its end."""
     if ending.outcome == "interrupted":
         where = f"; the results until then are in {run.path}" if run.path else ""
-        raise SimulationInterrupted(f"{ending.message}{where}", run)
+        raise SimulationInterrupted(f"interrupted at t = {ending.time:g} s{where}", run)
     if ending.outcome != "converged":
         raise SimulationError(failure_message(model, ending), run)

@@ -15,7 +15,7 @@ import numpy as np
 from linkwise.base import Array
 
 if TYPE_CHECKING:
-    from linkwise._core import Simulation
+    from linkwise._core import Ending, Simulation
     from linkwise.record.schema import Schema
 
 # One call into the core computes samples for about this long: short enough for a live progress
@@ -24,9 +24,6 @@ CALL_SECONDS = 0.2
 CALL_BYTES = 32 << 20
 # An interval between samples that takes long is itself cut, into this many pieces at most.
 MOST_PIECES = 1024
-COUNTERS = ("steps", "evaluations", "iterations")
-# What ends a run where it is no number. Products of huge rates overflow in loads before rates do.
-FINITE = ("position", "velocity", "acceleration", "drive_torque", "joint_load")
 
 
 class Progress(NamedTuple):
@@ -47,16 +44,6 @@ class Progress(NamedTuple):
     def remaining(self) -> float:
         """Expected seconds until the end, infinite before anything is known."""
         return (self.duration - self.time) / self.speed if self.speed > 0 else float("inf")
-
-
-class Ending(NamedTuple):
-    """How a time loop ended."""
-
-    outcome: str
-    time: float
-    joint: str
-    message: str
-    counters: Mapping[str, int]
 
 
 class Recorder(Protocol):
@@ -135,19 +122,6 @@ class _Pace:
             previous = float(wanted[-1])
 
 
-def first_not_finite(chunk: Mapping[str, Any]) -> tuple[str, int] | None:
-    """The quantity and the sample that is no number first, or None."""
-    found = None
-    for name in FINITE:
-        if name not in chunk or np.isfinite(chunk[name]).all():
-            continue
-        rows = np.isfinite(chunk[name]).reshape(len(chunk["time"]), -1).all(axis=1)
-        row = int(np.argmin(rows))
-        if found is None or row < found[1]:
-            found = name, row
-    return found
-
-
 def run_time_loop(
     simulation: Simulation,
     recorder: Recorder,
@@ -159,7 +133,6 @@ def run_time_loop(
     pace = _Pace(most=max(1, CALL_BYTES // schema.row_bytes))
     end = float(times[-1])
     started = clock.monotonic()
-    counters = dict.fromkeys(COUNTERS, 0)
     reached, recorded = 0.0, 0
     with _Interrupt() as interrupt:
         try:
@@ -168,38 +141,20 @@ def run_time_loop(
                 with interrupt.call():
                     chunk = simulation.advance(asked, schema.quantities if are_samples else ())
                 pace.adapt(clock.monotonic() - before)
-                wrong = first_not_finite(chunk)
-                if wrong is not None:
-                    name, row = wrong
-                    time = float(chunk["time"][row])
-                    recorder.append({key: values[:row] for key, values in chunk.items()})
-                    text = (
-                        f"t = {time:g} s: {name} is not finite; check masses, inertias, drives and "
-                        "the state for values that are far too large"
-                    )
-                    return Ending("not_finite", time, "", text, counters)
                 if are_samples:
                     recorder.append(chunk)
                     recorded += len(chunk["time"])
                 if len(chunk["time"]):
                     reached = float(chunk["time"][-1])
-                if len(chunk["time"]) or simulation.ending.outcome == "too_many_steps":
-                    counters = {name: getattr(simulation.statistics, name) for name in COUNTERS}
-                ended = simulation.ending
-                if ended.outcome == "interrupted":
+                if simulation.ending.outcome != "converged":
                     break
-                if ended.outcome != "converged":
-                    return Ending(
-                        ended.outcome, ended.time, simulation.stop_joint, ended.text, counters
-                    )
                 if progress is not None:
-                    wall = clock.monotonic() - started
-                    steps, evaluations = counters["steps"], counters["evaluations"]
-                    progress(Progress(reached, end, wall, steps, evaluations))
+                    wall, done = clock.monotonic() - started, simulation.statistics
+                    progress(Progress(reached, end, wall, done.steps, done.evaluations))
                 if interrupt.pressed:
                     break
         except KeyboardInterrupt:
             pass
-    if recorded < times.size:
-        return Ending("interrupted", reached, "", f"interrupted at t = {reached:g} s", counters)
-    return Ending("converged", reached, "", "", counters)
+    if recorded < times.size and simulation.ending.outcome == "converged":
+        simulation.interrupt()
+    return simulation.ending

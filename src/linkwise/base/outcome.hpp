@@ -39,9 +39,9 @@ std::string describe(Outcome outcome);
 /// How a simulation, or one member of several, ended.
 struct Ending {
   Outcome outcome = Outcome::converged;
-  double time = 0;   ///< of the evaluation that failed, else the last one reached
-  int joint = -1;    ///< where it failed, where that is known
-  std::string text;  ///< one line with the remedy; empty for `converged`
+  double time = 0;    ///< of the evaluation that failed, else the last one reached
+  std::string joint;  ///< where it failed, where that is known
+  std::string text;   ///< one line with the remedy; empty for `converged`
 
   bool ok() const { return outcome == Outcome::converged; }
 };

@@ -62,7 +62,7 @@ class FailedBody {
     for (int seen = body_; body > seen && !body_.compare_exchange_weak(seen, body);) {
     }
   }
-  void write(EvaluationReport& report) const {
+  void write(DynamicsReport& report) const {
     if (body_ < 0) return;
     report.outcome = Outcome::not_positive_definite;
     report.body = body_;
@@ -74,7 +74,7 @@ class FailedBody {
 
 /// Every state by one method, one after the other.
 void one_by_one(const Model& m, DynamicsMethod& method, size_t count, const BatchInput& s,
-                const ForwardOutput& out, EvaluationReport& report, const GoOn& go_on) {
+                const ForwardOutput& out, DynamicsReport& report, const GoOn& go_on) {
   const std::vector<double> zero(m.nv());
   for (size_t i = 0; i < count && go_on(); ++i) {
     SweepInput<double> in;
@@ -107,6 +107,11 @@ DynamicsOptions evaluation_options() {
   return options;
 }
 
+EvaluationReport evaluation_report(const Model& model, Choice choice,
+                                   const DynamicsReport& report) {
+  return {report, std::move(choice), report.body < 0 ? "" : model.body_name(report.body)};
+}
+
 std::string remedy_at(const Model& model, Outcome outcome, int body) {
   if (outcome == Outcome::not_positive_definite && body >= 0)
     if (std::string axes = model.lined_up(body); !axes.empty()) return axes;
@@ -121,9 +126,8 @@ std::string failure_text(const Model& model, const EvaluationReport& report) {
   const Choice& by = report.choice;
   return "method " + by.method + (by.solver.empty() ? "" : " with solver " + by.solver) + ": " +
          std::string(message(report.outcome)) +
-         (report.body < 0 ? ""
-                          : " at body '" + model.body_name(report.body) + "'" + model.where()) +
-         "; " + remedy_at(model, report.outcome, report.body);
+         (report.body < 0 ? "" : " at body '" + report.body_name + "'" + model.where()) + "; " +
+         remedy_at(model, report.outcome, report.body);
 }
 
 std::vector<Cause> causes_from_names(std::span<const std::string> names) {
@@ -246,10 +250,10 @@ EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& sta
   check(m, count, states);
   check_prescribed(m, states);
   require_determined(m);
-  EvaluationReport report;
+  DynamicsReport report;
+  Choice choice;
   Lease workspace(*this);
-  const Pick picked =
-      pick(*workspace, count, options, out.constraint_force != nullptr, report.choice);
+  const Pick picked = pick(*workspace, count, options, out.constraint_force != nullptr, choice);
   BatchInput s = states;
   std::vector<double> torques;
   if (states.passive_acts && m.has_passive_forces())
@@ -259,7 +263,7 @@ EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& sta
   if (!torques.empty()) s.tau = torques.data();
   if (picked.method) {
     one_by_one(m, *picked.method, count, s, out, report, go_on);
-    return report;
+    return evaluation_report(m, std::move(choice), report);
   }
   FailedBody failed;
   const auto part = [&](BatchEvaluator& batch, size_t first, size_t n) {
@@ -273,7 +277,7 @@ EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& sta
     part(own->batch, first, n);
   });
   failed.write(report);
-  return report;
+  return evaluation_report(m, std::move(choice), report);
 }
 
 EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& states,
@@ -304,10 +308,9 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
         n, s.from(m, first), causes, loads + first * width,
         by_force ? BatchMethod::constraint_force : BatchMethod::articulated_body));
   });
-  EvaluationReport report;
-  report.choice.method = method;
+  DynamicsReport report;
   failed.write(report);
-  return report;
+  return evaluation_report(m, {method, "", ""}, report);
 }
 
 void Evaluator::inverse_dynamics(size_t count, const BatchInput& states, const Executor& executor,

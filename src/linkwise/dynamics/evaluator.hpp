@@ -22,15 +22,11 @@ namespace linkwise {
 DynamicsOptions evaluation_options();
 
 /// How an evaluation went: the worst of its states, and what computed them.
-struct EvaluationReport {
-  Outcome outcome = Outcome::converged;
-  Choice choice;  ///< the reason only where constraint forces are asked for
-  int body = -1;  ///< at which it failed
-  int iterations = 0;
-  double error_estimate = 0;  ///< relative A-norm error of the constraint forces
-
-  bool ok() const { return outcome == Outcome::converged; }
+struct EvaluationReport : DynamicsReport {
+  Choice choice;          ///< the reason only where constraint forces are asked for
+  std::string body_name;  ///< of the body at which it failed, or empty
 };
+EvaluationReport evaluation_report(const Model& model, Choice choice, const DynamicsReport& report);
 
 /// Throws InputError where the machine does not determine its accelerations; see find_undetermined.
 void require_determined(const Model& model);

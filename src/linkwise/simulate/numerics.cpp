@@ -14,9 +14,9 @@ constexpr NumericsEntry table[] = {
      "error allowed in one step, in the same measure; a tenth of tolerance by default, which it "
      "replaces where given"},
     {"integrator", &Numerics::integrator, "one of linkwise.integrators()"},
-    {"step", &Numerics::step, "step of the fixed-step integrators, s"},
+    {"step", &Numerics::step, "step of the fixed-step integrators", "s"},
     {"max_step", &Numerics::max_step,
-     "longest step of the others, s; what acts by the clock is seen without it"},
+     "longest step of the others; what acts by the clock is seen without it", "s"},
     {"max_steps", &Numerics::max_steps, "most steps of the whole run; no bound by default"},
     {"method", &Numerics::method,
      "how accelerations are computed: auto, or one of linkwise.methods()"},
@@ -54,7 +54,8 @@ const NumericsEntry& find_numerics(std::string_view name) {
   throw InputError("unknown option '" + std::string(name) + "'; known: " + known);
 }
 
-SimulationOptions simulation_options(const Numerics& n, const Executor& executor) {
+SimulationOptions simulation_options(const Numerics& n, const Executor& executor,
+                                     const SolverOptionValues& solver_options) {
   SimulationOptions o;
   o.dynamics.executor = executor;
   if (!positive(n.tolerance))
@@ -71,6 +72,9 @@ SimulationOptions simulation_options(const Numerics& n, const Executor& executor
   o.dynamics.solver_options.tolerance = n.solver_tolerance.value_or(allowed_per_step / 10);
   o.dynamics.solver_options.max_iterations = n.max_iterations.value_or(0);
   o.follow_error_test = !n.solver_tolerance;
+  for (const auto& [name, value] : solver_options)
+    if (name == "tolerance" || name == "absolute_tolerance") o.follow_error_test = false;
+  set_options(o.dynamics.solver_options, solver_options);
   o.state = find_state(n.state);
   o.integrator = find_integrator(n.integrator).name;
   o.integration.tolerance = allowed_per_step;

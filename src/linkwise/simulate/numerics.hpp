@@ -31,13 +31,16 @@ struct NumericsEntry {
                std::optional<int> Numerics::*, std::string Numerics::*>
       member;
   std::string_view description;
+  std::string_view units = "";
 };
 
 std::span<const NumericsEntry> numerics_table();
 /// InputError, listing the known names, when the name is unknown.
 const NumericsEntry& find_numerics(std::string_view name);
 
-/// What follows for a simulation. InputError where a number is out of range or a name unknown.
-SimulationOptions simulation_options(const Numerics& numerics, const Executor& executor);
+/// What follows for a simulation; solver options go before what numerics say. InputError where a
+/// number is out of range or a name unknown.
+SimulationOptions simulation_options(const Numerics& numerics, const Executor& executor,
+                                     const SolverOptionValues& solver_options = {});
 
 }  // namespace linkwise

@@ -18,6 +18,12 @@ constexpr double largest_acceleration = 1e100;
 
 constexpr double whole_turn = 2 * std::numbers::pi;
 
+bool finite(const double* values, size_t n) {
+  double sum = 0;
+  for (size_t i = 0; i < n; ++i) sum += 0.0 * values[i];
+  return sum == 0;
+}
+
 }  // namespace
 
 Simulation::Simulation(std::shared_ptr<const Model> model, SimulationOptions options)
@@ -41,7 +47,7 @@ void Simulation::start(double t0, const Start& start) {
   y_.insert(y_.end(), start.v, start.v + members_ * nv());
   impose(t0, y_.data());
   for (size_t i = 0; i < members_; ++i) check_quaternions(m, y_.data() + i * nq());
-  endings_.assign(members_, {Outcome::converged, t0, -1, ""});
+  endings_.assign(members_, {Outcome::converged, t0, "", ""});
   failure_ = {};
   iterations_ = 0;
   if (observer_) observer_->started();
@@ -132,8 +138,8 @@ Outcome Simulation::accelerations(DynamicsMethod* method, double t, const double
   const SweepInput<double> in = input(t, y, rates_in(y));
   const auto evaluation = [&] { return method->evaluate(t, in, du, loads); };
   const bool is_integration = method == method_.get();
-  return judge(t, is_integration && observer_ ? observer_->evaluate(t, evaluation) : evaluation(),
-               du, static_cast<int>(nv()));
+  return judge(t, is_integration ? observed(t, evaluation) : evaluation(), du,
+               static_cast<int>(nv()));
 }
 
 /// Of all members; those whose evaluation fails end.
@@ -187,7 +193,7 @@ Ending Simulation::failure(size_t member, double t, Outcome outcome, int body,
     for (int i = info.v; i < info.v + info.nv && body < 0; ++i)
       if (!(std::abs(du[i]) < largest_acceleration)) joint = j;
   }
-  return {outcome, t, joint, described(outcome, body)};
+  return {outcome, t, joint < 0 ? "" : m.joints[joint].name, described(outcome, body)};
 }
 
 /// A fixed step that is too long for a stiff machine ends in states that cannot be evaluated.
@@ -327,8 +333,8 @@ bool Simulation::reach(double t) {
     }
     // The failure within the step says more than the failure of the step.
     if (failure_.outcome == outcome) return end_all(failure_);
-    const int joint = outcome == Outcome::interrupted ? -1 : failure_.joint;
-    return end_all({outcome, integrator_->time(), joint, described(outcome)});
+    return end_all({outcome, integrator_->time(),
+                    outcome == Outcome::interrupted ? "" : failure_.joint, described(outcome)});
   }
   return any_running();
 }
@@ -360,6 +366,7 @@ bool Simulation::write_sample(double t, const Sample& sample) {
   }
   const SimulationStatistics now = statistics();
   for (size_t i = 0; i < members_; ++i) {
+    if (endings_[i].ok()) check_sample(t, i, sample);
     const Instant at{model(),
                      y_.data() + i * nq(),
                      rates_in(y_.data()) + i * nv(),
@@ -372,7 +379,27 @@ bool Simulation::write_sample(double t, const Sample& sample) {
     sample.write(model(), i, running ? &at : nullptr);
     if (running) endings_[i].time = t;
   }
-  return true;
+  return any_running();
+}
+
+/// Ends a member with values that are no numbers. Products of huge rates overflow in loads before
+/// rates do.
+void Simulation::check_sample(double t, size_t member, const Sample& sample) {
+  const double* y = y_.data();
+  std::string_view wrong;
+  if (sample.needs(Needs::loads) && !finite(loads_.data() + member * n_load(), n_load()))
+    wrong = "joint_load";
+  if (sample.needs(Needs::forces)) {
+    if (!finite(forces_->drive(member), nv())) wrong = "drive_torque";
+    if (!finite(du_.data() + member * nv(), nv())) wrong = "acceleration";
+  }
+  if (!finite(rates_in(y) + member * nv(), nv())) wrong = "velocity";
+  if (!finite(y + member * nq(), nq())) wrong = "position";
+  if (wrong.empty()) return;
+  endings_[member] = {Outcome::not_finite, t, "",
+                      std::string(wrong) +
+                          " is not finite; check masses, inertias, drives and the state for values "
+                          "that are far too large"};
 }
 
 /// The drive torques of joints of given motion: what the motion takes, less what acts by itself.

@@ -58,7 +58,7 @@ class Simulation : private OdeSystem {
   const Ending& ending(size_t member = 0) const { return endings_[member]; }
   SimulationStatistics statistics() const;
   /// Ends what still runs.
-  void stop(Outcome outcome) { end_all({outcome, integrator_->time(), -1, describe(outcome)}); }
+  void stop(Outcome outcome) { end_all({outcome, integrator_->time(), "", describe(outcome)}); }
 
   /// Asked at every step: once it is true, the run stops with the outcome `interrupted`.
   void set_interrupt(std::function<bool()> interrupted) { interrupted_ = std::move(interrupted); }
@@ -115,6 +115,7 @@ class Simulation : private OdeSystem {
   bool reach(double t);
   bool end_all(const Ending& ending);
   bool write_sample(double t, const Sample& sample);
+  void check_sample(double t, size_t member, const Sample& sample);
   void add_holding_torques();
 
   std::shared_ptr<Setup> setup_;

@@ -64,6 +64,11 @@ void SolverOptions::set(std::string_view name, OptionValue value) {
     own.set(option, std::move(value));
 }
 
+void set_options(SolverOptions& options, const SolverOptionValues& values) {
+  for (const auto& [name, value] : values) options.set(name, value);
+  if (!values.empty()) validate(options);
+}
+
 void validate(const SolverOptions& o) {
   checked(common[0], o.tolerance);
   checked(common[1], o.absolute_tolerance);

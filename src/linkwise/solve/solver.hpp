@@ -5,6 +5,8 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "linkwise/base/outcome.hpp"
 #include "linkwise/exec/executor.hpp"
@@ -53,6 +55,11 @@ struct SolverOptions {
   void set(std::string_view name, OptionValue value);
   bool operator==(const SolverOptions&) const = default;
 };
+
+/// Options by the names that users give them.
+using SolverOptionValues = std::vector<std::pair<std::string, OptionValue>>;
+/// Sets and validates them all.
+void set_options(SolverOptions& options, const SolverOptionValues& values);
 
 /// The options that every solver has, by name.
 std::span<const Option> common_options();

@@ -193,11 +193,11 @@ TEST(Evaluator, FailuresNameTheMethodTheBodyAndTheRemedy) {
   const Model m(singular_spec());
   for (const size_t count : {size_t{1}, size_t{2}})  // known before any elimination
     EXPECT_THROW(Evaluated(m, count, asking_for("auto")), InputError);
-  EvaluationReport report;
+  DynamicsReport report;
   report.outcome = Outcome::not_positive_definite;
   report.body = 0;
-  report.choice.method = "articulated_body";
-  const std::string text = failure_text(m, report);
+  const std::string text =
+      failure_text(m, evaluation_report(m, {"articulated_body", "", ""}, report));
   for (const std::string& part :
        {std::string("method articulated_body"), "'" + m.body_name(0) + "'",
         std::string(remedy(Outcome::not_positive_definite))})

@@ -59,6 +59,22 @@ TEST(Numerics, ShareOfTheToleranceGoesToAStepAndToTheForces) {
   EXPECT_FALSE(simulation_options(numerics, Executor()).follow_error_test);
 }
 
+// An accuracy that is asked of the solver itself is not the error test's to choose.
+TEST(Numerics, AToleranceOfTheSolverIsFixed) {
+  const auto follows = [](const SolverOptionValues& values) {
+    return simulation_options({}, Executor(), values).follow_error_test;
+  };
+  EXPECT_TRUE(follows({}));
+  EXPECT_TRUE(follows({{"omega", 1.5}}));
+  EXPECT_FALSE(follows({{"tolerance", 1e-9}}));
+  EXPECT_FALSE(follows({{"omega", 1.5}, {"absolute_tolerance", 1e-9}}));
+  EXPECT_EQ(
+      simulation_options({}, Executor(), {{"tolerance", 1e-9}}).dynamics.solver_options.tolerance,
+      1e-9);
+  EXPECT_THROW(follows({{"magic", 1.5}}), InputError);
+  EXPECT_THROW(follows({{"tolerance", -1.0}}), InputError);
+}
+
 TEST(Numerics, RefusesWhatItDoesNotKnow) {
   EXPECT_THROW(find_numerics("speed"), InputError);
   for (const NumericsEntry& entry : numerics_table()) EXPECT_EQ(&find_numerics(entry.name), &entry);

@@ -25,7 +25,7 @@ TEST(Stops, NotFiniteNamesTheJointAndKeepsWhatCameBefore) {
     const Ending& stop = simulation.ending();
     EXPECT_FALSE(stop.ok());
     EXPECT_EQ(stop.outcome, Outcome::not_finite);
-    EXPECT_EQ(stop.joint, joint);
+    EXPECT_EQ(stop.joint, model->joints[joint].name);
     EXPECT_NEAR(stop.time, 0.25, 0.05);
     EXPECT_FALSE(stop.text.empty());
     Recorded later;
@@ -69,7 +69,7 @@ TEST(Stops, AStateThatBlowsUpIsNotFinite) {
   const auto at = run(simulation, every(0.01, 10));
   EXPECT_LT(at.size(), 1000u);
   EXPECT_EQ(simulation.ending().outcome, Outcome::not_finite);
-  EXPECT_EQ(simulation.ending().joint, 0);
+  EXPECT_EQ(simulation.ending().joint, simulation.model().joints[0].name);
   for (const Recorded& i : at) EXPECT_TRUE(std::isfinite(i.q[0] + i.v[0]));
 }
 
@@ -110,7 +110,7 @@ TEST(Stops, AfterARecoveryWithoutAJoint) {
     run(simulation, {0, 1e9});
     EXPECT_TRUE(failed);
     EXPECT_EQ(simulation.ending().outcome, Outcome::interrupted) << entry.name;
-    EXPECT_EQ(simulation.ending().joint, -1) << entry.name;
+    EXPECT_EQ(simulation.ending().joint, "") << entry.name;
     EXPECT_GT(simulation.ending().time, 0.25);
   }
 }

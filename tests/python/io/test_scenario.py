@@ -2,6 +2,7 @@
 
 import inspect
 import math
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import linkwise as lw
 from linkwise import drives
 from linkwise._core import InputError
 from linkwise.scenario import load_scenario
+from linkwise.scenario.schema import SimulateSection
 
 GOOD = """model = "arm.urdf"
 [simulate]
@@ -503,3 +505,13 @@ def test_any_toml_is_a_scenario_or_one_line(tmp_path_factory, entries):
     assert message.isprintable()
     assert message.startswith(str(path))
     assert "; " in message
+
+
+def test_options_are_those_of_the_core(write):
+    names = {row["name"] for row in lw.numerics()}
+    assert {*SimulateSection.model_fields} == {"duration", "threads", *names}
+    assert {field.name for field in fields(lw.Numerics)} == {*names, "solver_options"}
+    assert {row["name"]: row["units"] for row in lw.numerics() if row["units"]} == {
+        "step": "s",
+        "max_step": "s",
+    }

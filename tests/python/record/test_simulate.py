@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -374,7 +375,8 @@ def test_simulates_in_another_thread(chain):
 
 
 def test_failure_message_names_outcome_time_and_joint(chain):
-    ending = time_loop.Ending("not_finite", 1.25, "joint_2", "overflow; limit the step", {})
+    text = "overflow; limit the step"
+    ending = SimpleNamespace(outcome="not_finite", time=1.25, joint="joint_2", text=text)
     message = simulate.failure_message(chain, ending)
     assert message == (
         "simulation of 'chain' stopped at t = 1.25 s with outcome not_finite, joint 'joint_2': "
