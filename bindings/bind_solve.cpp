@@ -14,6 +14,7 @@
 #include "linkwise/constraint/tree_system.hpp"
 #include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/forces/passive.hpp"
+#include "linkwise/linear/triplets.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "linkwise/solve/spectrum.hpp"
 #include "numbers.hpp"
@@ -184,69 +185,16 @@ class PyConstraintSystem {
   std::vector<double> q_, v_, tau_, external_;
 };
 
-/// Triplets of a block tree. A hub contributes the blocks of its clique, which solvers never form.
-struct Triplets {
-  std::vector<double> row, column, value;
-
-  void add_block(const BlockTree& A, int i, int j, const Block& block, bool mirrored) {
-    for (int r = 0; r < A.dim[i]; ++r)
-      for (int c = 0; c < A.dim[j]; ++c) {
-        add(A.offset[i] + r, A.offset[j] + c, block[block_stride * r + c]);
-        if (mirrored) add(A.offset[j] + c, A.offset[i] + r, block[block_stride * r + c]);
-      }
-  }
-  void add(int i, int j, double x) {
-    row.push_back(i);
-    column.push_back(j);
-    value.push_back(x);
-  }
-};
-
-/// left (rows x 6) times C times right^T (6 x columns), times `factor`.
-Block through_body(const Block& left, int rows, const Block& C, const Block& right, int columns,
-                   double factor) {
-  Block half{}, out{};
-  for (int r = 0; r < rows; ++r)
-    for (int c = 0; c < 6; ++c)
-      for (int k = 0; k < 6; ++k)
-        half[block_stride * r + c] += left[block_stride * r + k] * C[block_stride * k + c];
-  for (int r = 0; r < rows; ++r)
-    for (int c = 0; c < columns; ++c)
-      for (int k = 0; k < 6; ++k)
-        out[block_stride * r + c] +=
-            factor * half[block_stride * r + k] * right[block_stride * c + k];
-  return out;
-}
-
 nb::object PyConstraintSystem::sparse() const {
-  const BlockTree& tree = A();
-  Triplets entries;
-  for (int i = 0; i < tree.n(); ++i) {
-    entries.add_block(tree, i, i, tree.diag[i], false);
-    if (tree.parent[i] >= 0 && tree.lever_of[i] < 0)
-      entries.add_block(tree, i, tree.parent[i], tree.parent_block[i], true);
-  }
-  for (const BlockTree::Hub& hub : tree.hubs)
-    for (int i : hub.children) {
-      const Block& H = tree.levers[tree.lever_of[i]];
-      entries.add_block(
-          tree, i, hub.node,
-          through_body(H, tree.dim[i], hub.compliance, hub.inboard, tree.dim[hub.node], -1), true);
-      for (int s : hub.children)
-        if (s < i)
-          entries.add_block(tree, i, s,
-                            through_body(H, tree.dim[i], hub.compliance,
-                                         tree.levers[tree.lever_of[s]], tree.dim[s], 1),
-                            true);
-    }
-  const auto index = [](const std::vector<double>& values) {
-    return nb::cast(to_numpy(values)).attr("astype")("int64");
+  const Triplets entries = triplets_of(A());
+  const auto index = [](const std::vector<int>& values) {
+    return nb::cast(to_numpy({values.begin(), values.end()})).attr("astype")("int64");
   };
   const nb::object coordinates = nb::make_tuple(index(entries.row), index(entries.column));
   const nb::object array =
       nb::module_::import_("scipy.sparse")
           .attr("coo_array")(nb::make_tuple(to_numpy(entries.value), coordinates),
-                             "shape"_a = nb::make_tuple(tree.size(), tree.size()));
+                             "shape"_a = nb::make_tuple(A().size(), A().size()));
   return array.attr("tocsr")();
 }
 
