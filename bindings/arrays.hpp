@@ -315,6 +315,14 @@ inline bool is_finite(const double* data, size_t n) {
   return finite;
 }
 
+/// What only describes an object: writing into it would change a copy without a word, and is
+/// refused.
+inline nb::object read_only(nb::object array) {
+  constexpr int writeable = 0x400;
+  reinterpret_cast<NumpyArray*>(array.ptr())->flags &= ~writeable;
+  return array;
+}
+
 /// A vector as a new 1-D array.
 inline nb::object to_numpy(const std::vector<double>& values) {
   NewArray out({values.size()});

@@ -37,14 +37,7 @@ void add_joint(ModelBuilder& builder, std::string name, const std::string& type,
     const ArrayIn given = as_array(initial, "initial");
     joint.initial.assign(given.data(), given.data() + given.size());
   }
-  ModelBuilder::Properties values;
-  for (auto [key, value] : properties) {
-    values.emplace_back(nb::cast<std::string>(key), std::nullopt);
-    if (value.is_none()) continue;
-    const ArrayIn given = as_array(value, values.back().first.c_str());
-    values.back().second.emplace(given.data(), given.data() + given.size());
-  }
-  builder.add_joint(std::move(joint), type, pitch, std::move(values));
+  builder.add_joint(std::move(joint), type, pitch, properties_from(properties));
 }
 
 /// A chain of equal links made without Python objects: N in the millions.
@@ -74,6 +67,20 @@ PyModel* chain_of(size_t n, const std::string& joint, nb::handle axes, nb::handl
 LinkSpec link_spec(std::string name, double mass, nb::handle com, nb::handle inertia) {
   return make_link(std::move(name), mass, com.is_none() ? Vec3<double>{} : vec3(com, "com"),
                    inertia.is_none() ? Mat3<double>{} : mat3(inertia, "inertia"));
+}
+
+Properties properties_from(const nb::dict& given) {
+  Properties found;
+  for (auto [key, value] : given) {
+    std::string name;
+    if (!nb::try_cast(key, name))
+      throw InputError("a joint property is no text; give its name in quotes");
+    found.emplace_back(std::move(name), std::nullopt);
+    if (value.is_none()) continue;
+    const ArrayIn array = as_array(value, found.back().first.c_str());
+    found.back().second.emplace(array.data(), array.data() + array.size());
+  }
+  return found;
 }
 
 namespace {
@@ -151,9 +158,9 @@ Args:
     axes: two for universal, a list of (kind, axis) or ("helical", axis, pitch) for composite.
     pitch: of helical [m/rad].
     initial: the joint's coordinates [rad, m] where a simulation starts; None: its zero position.
-    properties: damping, friction, friction_velocity, stiffness, rest_position, armature, lower,
-        upper, effort, velocity, limit_stiffness, limit_damping; one value, or one per degree of
-        freedom. The units are those of Model.damping and so on.
+    properties: damping, friction, friction_velocity, stiffness, rest_position, armature (or
+        motor_inertia and gear_ratio), lower, upper, effort, velocity, limit_stiffness,
+        limit_damping; one value, or one per degree of freedom. Units as in Model.with_joint.
 
 Raises:
     InputError: a type, property or shape is wrong; what concerns several elements, build checks.)")

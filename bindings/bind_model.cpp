@@ -72,6 +72,25 @@ PyModel* with_link(const PyModel& self, const std::string& link, nb::handle mass
   return new PyModel(std::move(spec));
 }
 
+PyModel* joints_on(const PyModel& self, const nb::dict& joints) {
+  std::vector<std::pair<std::string, Properties>> given;
+  for (auto [key, value] : joints) {
+    std::string joint;
+    if (!nb::try_cast(key, joint) || !nb::isinstance<nb::dict>(value))
+      throw InputError(
+          "joint properties are no dict of dicts; give {\"elbow\": {\"armature\": 0.1}}");
+    self.model->joint_index(joint);  // names what is unknown or merged
+    given.emplace_back(std::move(joint), properties_from(nb::borrow<nb::dict>(value)));
+  }
+  return new PyModel(with_joints(self.model->spec(), std::move(given)));
+}
+
+PyModel* with_joint(const PyModel& self, const std::string& joint, const nb::kwargs& properties) {
+  nb::dict one;
+  one[joint.c_str()] = properties;
+  return joints_on(self, one);
+}
+
 PyModel* prescribe(const PyModel& self, const std::vector<std::string>& names) {
   ModelSpec spec = self.model->spec();
   for (const std::string& name : names) {
@@ -113,7 +132,7 @@ nb::object link_centers_of_mass(const PyModel& self) {
   double* row = out.data;
   for (const LinkSpec& link : links)
     for (double x : {link.com.x, link.com.y, link.com.z}) *row++ = x;
-  return out.array;
+  return read_only(out.array);
 }
 
 nb::object link_inertias(const PyModel& self) {
@@ -123,7 +142,7 @@ nb::object link_inertias(const PyModel& self) {
   for (const LinkSpec& link : links)
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) *row++ = link.inertia.m[packed(i, j)];
-  return out.array;
+  return read_only(out.array);
 }
 
 void bind_sizes(ModelClass& c) {
@@ -152,7 +171,7 @@ void bind_sizes(ModelClass& c) {
           "gravity",
           [](const PyModel& s) {
             const auto& g = s.model->gravity;
-            return to_numpy({g.x, g.y, g.z});
+            return read_only(to_numpy({g.x, g.y, g.z}));
           },
           nb::rv_policy::move, "(3,) [m/s2], world axes.")
       .def_prop_ro(
@@ -233,7 +252,7 @@ void bind_joints(ModelClass& c) {
                   j.last_of_body
                       ? with_body(*s.model, j.body, [](const auto& body) { return mass(body); })
                       : 0.0);
-            return to_numpy(masses);
+            return read_only(to_numpy(masses));
           },
           nb::rv_policy::move,
           "Mass (n_joints,) [kg] of the child link of each joint, with what was welded to it; 0 "
@@ -270,7 +289,7 @@ void bind_dof_properties(ModelClass& c) {
   c.def(
       "dof_property",
       [](const PyModel& s, const std::string& name) {
-        return to_numpy(s.model->dof_values(dof_property_from_name(name)));
+        return read_only(to_numpy(s.model->dof_values(dof_property_from_name(name))));
       },
       "name"_a,
       "A joint property (nv,) by its name, as in ModelBuilder.add_joint, in the unit that the "
@@ -280,7 +299,7 @@ void bind_dof_properties(ModelClass& c) {
     for (const char* limit : {"lower", "upper", "effort", "velocity"})
       if (attribute == limit) attribute += "_limit";
     const nb::object getter = nb::cpp_function(
-        [p](const PyModel& s) { return to_numpy(s.model->dof[p]); }, nb::is_method());
+        [p](const PyModel& s) { return read_only(to_numpy(s.model->dof[p])); }, nb::is_method());
     c.attr(attribute.c_str()) =
         nb::module_::import_("builtins")
             .attr("property")(getter, nb::none(), nb::none(), dof_property_table[p].text);
@@ -301,7 +320,7 @@ void bind_links(ModelClass& c) {
           [](const PyModel& s) {
             std::vector<double> masses;
             for (const LinkSpec& link : s.model->spec().links) masses.push_back(link.mass);
-            return to_numpy(masses);
+            return read_only(to_numpy(masses));
           },
           nb::rv_policy::move,
           "Mass of each link (n_links,) [kg], in the order of link_names, as the source gives it.")
@@ -347,15 +366,47 @@ Args:
 
 Raises:
     InputError: the link is unknown, or no body has such an inertia.)")
-      .def(
-          "to_bytes",
-          [](const PyModel& s, const nb::object& source) {
-            ModelSpec spec = s.model->spec();
-            if (!source.is_none()) spec.source = nb::cast<std::string>(source);
-            return to_bytes(spec);
-          },
-          nb::kw_only(), "source"_a = nb::none(),
-          R"(The model's description, for from_bytes. source replaces Model.source in it, which may
+      .def("with_joint", &with_joint, "joint"_a, "properties"_a, nb::rv_policy::take_ownership,
+           R"(The same machine with other properties of one joint; what is not given stays.
+
+All act at the joint, behind the gear: a drive's torque and `effort` too (as in Drake and MuJoCo),
+and the motor's own torque is the joint's over gear_ratio.
+
+Args:
+    joint: its name.
+    properties: as of ModelBuilder.add_joint, one value, or one per degree of freedom:
+        damping [N m s/rad, N s/m]; friction [N m, N]; friction_velocity [rad/s, m/s];
+        stiffness [N m/rad, N/m]; rest_position, lower, upper [rad, m];
+        armature [kg m2, kg], the rotor's inertia seen at the joint, or motor_inertia [kg m2] of
+        the rotor itself with gear_ratio [rad/rad, rad/m] (1 unless given):
+        armature = gear_ratio^2 motor_inertia;
+        limit_stiffness [N m/rad, N/m] and limit_damping [s/rad, s/m] of the stops;
+        effort [N m, N] and velocity [rad/s, m/s], which limit nothing.
+
+Raises:
+    InputError: the joint or a property is unknown, the joint is merged or the floating base, or a
+        number makes no sense.)")
+      .def("with_joints", &joints_on, "joints"_a, nb::rv_policy::take_ownership,
+           R"(The same machine with other properties of several joints.
+
+Args:
+    joints: by name the properties of each, {"elbow": {"armature": 0.1}}; units and meaning as in
+        with_joint.
+
+Raises:
+    InputError: as with_joint.)");
+}
+
+void bind_storage(ModelClass& c) {
+  c.def(
+       "to_bytes",
+       [](const PyModel& s, const nb::object& source) {
+         ModelSpec spec = s.model->spec();
+         if (!source.is_none()) spec.source = nb::cast<std::string>(source);
+         return to_bytes(spec);
+       },
+       nb::kw_only(), "source"_a = nb::none(),
+       R"(The model's description, for from_bytes. source replaces Model.source in it, which may
 be a path; None keeps it.)")
       .def_static(
           "from_bytes",
@@ -378,6 +429,7 @@ void bind_model(nb::module_& m) {
   bind_dof_properties(c);
   bind_links(c);
   bind_variants(c);
+  bind_storage(c);
 }
 
 }  // namespace linkwise::bindings

@@ -91,7 +91,7 @@ class PyConstraintSystem {
   const BlockTree& A() const { return system_.A(); }
   const Model& model() const { return *model_; }
 
-  nb::object right_hand_side() const { return to_numpy(system_.b()); }
+  nb::object right_hand_side() const { return read_only(to_numpy(system_.b())); }
 
   std::vector<double> unknowns(nb::handle value, const char* name) const {
     const Argument given(name, {size(A().size())}, value);
@@ -210,7 +210,7 @@ class PyDynamicsMethod {
   const Choice& choice() const { return choice_; }
   nb::object constraint_force() const {
     const std::span<const double> f = method_->constraint_force();
-    return to_numpy({f.begin(), f.end()});
+    return read_only(to_numpy({f.begin(), f.end()}));
   }
   void reset() { method_ = make_dynamics(*model_, options_); }
 

@@ -1,6 +1,6 @@
 #pragma once
 // Vectors and matrices of three from Python.
-#include "linkwise/model/spec.hpp"
+#include "linkwise/model/builder.hpp"
 #include "linkwise/spatial/vec3.hpp"
 #include "numbers.hpp"
 
@@ -26,5 +26,8 @@ inline Mat3<double> mat3(nb::handle value, const char* name) {
 
 /// A link from its mass, and its centre of mass and inertia or None.
 LinkSpec link_spec(std::string name, double mass, nb::handle com, nb::handle inertia);
+
+/// Joint properties by name, each a number, an array, or None.
+Properties properties_from(const nb::dict& given);
 
 }  // namespace linkwise::bindings

@@ -48,6 +48,7 @@ PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "threads": "int",
     "stop": "str",
     "tolerance": "float",
+    "joints": "dict[str, dict[str, Any]]",
     "properties": "Any",
 }
 

@@ -15,6 +15,15 @@ if TYPE_CHECKING:
     from linkwise._core import Model
 
 _MOST_ROWS = 60
+_LIMITS = ("lower", "upper", "effort", "velocity")
+#: What acts on a joint, each with what says how.
+_ACTING = {
+    "armature": (),
+    "damping": (),
+    "friction": ("friction_velocity",),
+    "stiffness": ("rest_position",),
+    "limit_stiffness": ("limit_damping",),
+}
 
 
 def inspect(
@@ -35,6 +44,8 @@ def inspect(
     screen.print(_headline(found), markup=False)
     most = len(found["joints"]) if every_row else _MOST_ROWS
     screen.print(_joint_table(found["joints"], most))
+    if (properties := _property_table(found["joints"], most)) is not None:
+        screen.print(properties)
     notes = found["notes"]
     if notes:
         screen.print(_note_table(notes, len(notes) if every_row else _MOST_ROWS))
@@ -44,10 +55,8 @@ def describe_model(model: Model) -> dict[str, Any]:
     """The model as plain data: what the tables and `--json` show."""
     names, types, bodies = model.joint_names, model.joint_types, model.child_link_names
     parents, axes, masses = model.joint_parents, model.joint_axes, model.child_link_masses.tolist()
-    limits = {
-        key: getattr(model, f"{key}_limit").tolist()
-        for key in ("lower", "upper", "effort", "velocity")
-    }
+    acting = [key for name, more in _ACTING.items() for key in (name, *more)]
+    properties = {key: model.dof_property(key).tolist() for key in (*_LIMITS, *acting)}
     joints = []
     first = 0
     for k, count in enumerate(model.joint_nv):
@@ -62,7 +71,7 @@ def describe_model(model: Model) -> dict[str, Any]:
                 "body": bodies[k],
                 "mass": masses[k],
                 "degrees_of_freedom": count,
-                **{key: values[span] for key, values in limits.items()},
+                **{key: values[span] for key, values in properties.items()},
             }
         )
     return {
@@ -142,6 +151,28 @@ def _joint_table(joints: Sequence[dict[str, Any]], most: int) -> Any:
             text(joint["body"]),
             number(joint["mass"]),
         )
+    return made
+
+
+def _property_table(joints: Sequence[dict[str, Any]], most: int) -> Any:
+    """What acts on joints: a row for each that has any, a column for each that any has; or None."""
+    used = [name for name in _ACTING if any(any(joint[name]) for joint in joints)]
+    rows = [joint for joint in joints if any(any(joint[name]) for name in used)]
+    if not rows:
+        return None
+    columns = [column for name in used for column in (name, *_ACTING[name])]
+    title = "Joint properties [SI]"
+    if len(rows) > most:
+        title += f" (the first {most} of {len(rows)}; --all shows all)"
+    made = table(title, [("joint", "left"), *((name, "right") for name in columns)])
+    for joint in rows[:most]:
+        cells = []
+        for name in used:
+            for column in (name, *_ACTING[name]):
+                values = joint[column] if any(joint[name]) else []
+                shown = values[:1] if len(set(values)) == 1 else values
+                cells.append(", ".join(map(number, shown)))
+        made.add_row(text(joint["joint"]), *cells)
     return made
 
 

@@ -45,6 +45,23 @@ _KINDS = {
     "stiffness": ("angular stiffness", "stiffness"),
     "damping": ("angular damping", "damping"),
 }
+# The same for the properties of a joint.
+_PROPERTIES = {
+    "damping": _KINDS["damping"],
+    "friction": _KINDS["torque"],
+    "friction_velocity": _KINDS["velocity"],
+    "stiffness": _KINDS["stiffness"],
+    "rest_position": _KINDS["position"],
+    "armature": ("inertia", "mass"),
+    "motor_inertia": ("inertia", "inertia"),
+    "gear_ratio": ("number", "number"),
+    "lower": _KINDS["position"],
+    "upper": _KINDS["position"],
+    "effort": _KINDS["torque"],
+    "velocity": _KINDS["velocity"],
+    "limit_stiffness": _KINDS["stiffness"],
+    "limit_damping": ("time per angle", "time per length"),
+}
 
 
 @dataclass(frozen=True)
@@ -79,6 +96,25 @@ class ArgumentBuilder:
         self.model = model
         self.joint_names = {name: index for index, name in enumerate(model.joint_names)}
         self.tables: dict[Path, CsvTable] = {}
+
+    def joint_properties(self) -> dict[str, dict[str, npt.NDArray[np.float64]]]:
+        """By joint the properties that the scenario gives it."""
+        result: dict[str, dict[str, npt.NDArray[np.float64]]] = {}
+        for joint, section in self.source.settings.joint.items():
+            keys = ("joint", joint)
+            units = self._units(joint, keys, positions=False)
+            given = {name: getattr(section, name) for name in _PROPERTIES}
+            result[joint] = {
+                name: self._fit(
+                    value if isinstance(value, list) else [value] * len(units),
+                    units,
+                    (*keys, name),
+                    _PROPERTIES[name],
+                )
+                for name, value in given.items()
+                if value is not None
+            }
+        return result
 
     # -- state and output -------------------------------------------------------------------
 
@@ -392,6 +428,17 @@ def with_inertias(source: ScenarioSource, model: Model) -> Model:
             )
         except InputError as error:
             source.complain(keys, str(error), "correct its name or its inertial data")
+    return model
+
+
+def with_properties(source: ScenarioSource, model: Model) -> Model:
+    """The model with the joint properties that the scenario changes."""
+    for joint, properties in ArgumentBuilder(source, model).joint_properties().items():
+        try:
+            model = model.with_joint(joint, **properties)
+        except InputError as error:
+            problem, _, remedy = str(error).partition("; ")
+            source.complain(("joint", joint), problem, remedy)
     return model
 
 

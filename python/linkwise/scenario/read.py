@@ -20,7 +20,13 @@ from linkwise.io.files import SCENARIO_BYTES, read_bytes
 from linkwise.io.load import load
 from linkwise.loads.rating import Rating
 from linkwise.notes import quiet, tell, warnings_of
-from linkwise.scenario.arguments import ArgumentBuilder, ScenarioSource, key_path, with_inertias
+from linkwise.scenario.arguments import (
+    ArgumentBuilder,
+    ScenarioSource,
+    key_path,
+    with_inertias,
+    with_properties,
+)
 from linkwise.scenario.schema import RatingsFile, ScenarioFile, describe, keys_at
 
 # tomllib takes time quadratic in the parts of a dotted key: minutes for a file of 100 kB.
@@ -38,13 +44,13 @@ class Scenario(ScenarioSource):
     text: str
 
     def load_model(self) -> Model:
-        """The machine with its payloads. Raises InputError if it cannot be had.
+        """The machine with its payloads and properties. Raises InputError if it cannot be had.
 
         What was ignored or assumed is a ModelWarning each, as in `linkwise.load`.
         """
         with quiet():  # the scenario may cure what is wrong in the model's file
             bare = self._bare_model()
-        model = with_inertias(self, bare)
+        model = with_properties(self, with_inertias(self, bare))
         tell(warnings_of(model), reading=True)
         return model
 

@@ -33,7 +33,7 @@ class Quantity(NamedTuple):
     dimension: str | None
 
 
-def _quantity(value: Any) -> Quantity:
+def _quantity(value: Any, infinite: bool = False) -> Quantity:
     if isinstance(value, str):
         return Quantity(*parse_quantity(value))
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -42,7 +42,7 @@ def _quantity(value: Any) -> Quantity:
         number = float(value)
     except OverflowError:
         raise ValueError("is too large for a double; give a smaller number") from None
-    if not math.isfinite(number):
+    if not math.isfinite(number) and not (infinite and math.isinf(number)):
         raise ValueError(f"is {value}, not a finite number; give a finite number")
     return Quantity(number, None)
 
@@ -53,6 +53,13 @@ def _quantities(value: Any) -> Quantity | list[Quantity]:
             "is a table where a number belongs; put quotes around a joint name that holds a dot"
         )
     return [_quantity(v) for v in value] if isinstance(value, list) else _quantity(value)
+
+
+def _limits(value: Any) -> Quantity | list[Quantity]:
+    """As _quantities; inf and -inf are no limit."""
+    if isinstance(value, list):
+        return [_quantity(v, infinite=True) for v in value]
+    return _quantity(value, infinite=True)
 
 
 def _of(*dimensions: str) -> BeforeValidator:
@@ -66,6 +73,7 @@ def _of(*dimensions: str) -> BeforeValidator:
 
 Scalar = Annotated[Quantity, PlainValidator(_quantity)]
 Vector = Annotated[Quantity | list[Quantity], PlainValidator(_quantities)]
+Limit = Annotated[Quantity | list[Quantity], PlainValidator(_limits)]
 Number = Annotated[float, _of("number")]
 Time = Annotated[float, _of("time"), Field(gt=0)]
 Count = Annotated[int, Field(ge=1, lt=2**31)]
@@ -250,6 +258,26 @@ class PayloadSection(LinkSection):
     mass: Mass
 
 
+class JointSection(Section):
+    """Other properties of a joint; what is not given stays as in the model. Keys as in
+    ModelBuilder.add_joint, a value for all degrees of freedom or one for each."""
+
+    damping: Vector | None = None
+    friction: Vector | None = None
+    friction_velocity: Vector | None = None
+    stiffness: Vector | None = None
+    rest_position: Vector | None = None
+    armature: Vector | None = None
+    motor_inertia: Vector | None = None
+    gear_ratio: Vector | None = None
+    lower: Limit | None = None
+    upper: Limit | None = None
+    effort: Limit | None = None
+    velocity: Limit | None = None
+    limit_stiffness: Vector | None = None
+    limit_damping: Vector | None = None
+
+
 Force = Annotated[float, _of("force"), Field(gt=0)]
 Moment = Annotated[float, _of("moment"), Field(gt=0)]
 
@@ -319,6 +347,7 @@ class ScenarioFile(Section):
     wrench: dict[str, WrenchSection] = {}
     payload: dict[str, PayloadSection] = {}
     link: dict[str, LinkSection] = {}
+    joint: dict[str, JointSection] = {}
     rating: dict[str, RatingSection] = {}
     simulate: SimulateSection
     output: OutputSection = OutputSection()
@@ -343,6 +372,7 @@ _NAMED: dict[str, type[Section]] = {
     "wrench": WrenchSection,
     "payload": PayloadSection,
     "link": LinkSection,
+    "joint": JointSection,
     "rating": RatingSection,
 }
 

@@ -2,11 +2,71 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/model/joint_types.hpp"
+#include "linkwise/model/validate.hpp"
 
 namespace linkwise {
+namespace {
+
+using Values = std::optional<std::vector<double>>;
+
+/// Takes what `name` is given out of the properties; nothing where it is not there.
+Values take(Properties& properties, const std::string& name) {
+  Values found;
+  std::erase_if(properties, [&](auto& given) {
+    if (given.first != name) return false;
+    found = std::move(given.second);
+    return true;
+  });
+  return found;
+}
+
+/// Puts the armature of a rotor behind its gear, g^2 J, in the place of these two.
+void reflect_motor(Properties& properties) {
+  const Values inertia = take(properties, "motor_inertia");
+  const Values ratio = take(properties, "gear_ratio");
+  if (ratio && !inertia)
+    throw InputError(
+        "gear_ratio is given without motor_inertia; give both, or armature = gear_ratio^2 "
+        "motor_inertia (torques are those at the joint, behind the gear)");
+  if (!inertia) return;
+  for (const auto& [name, values] : properties)
+    if (name == "armature" && values)
+      throw InputError("both armature and motor_inertia are given; keep one");
+  for (double J : *inertia)
+    if (J < 0)
+      throw InputError("motor_inertia is negative (" + number_text(J) + "); give a value >= 0");
+  const std::vector<double> one{1.0};
+  const std::vector<double>& g = ratio ? *ratio : one;
+  for (double x : g)
+    if (x == 0 || !std::isfinite(x))
+      throw InputError("gear_ratio is " + number_text(x) + "; give a finite number other than 0");
+  const size_t n = std::max(g.size(), inertia->size());
+  if ((g.size() != 1 && g.size() != n) || (inertia->size() != 1 && inertia->size() != n))
+    throw InputError("gear_ratio has " + std::to_string(g.size()) + " values and motor_inertia " +
+                     std::to_string(inertia->size()) + "; give as many, or one");
+  std::vector<double> armature(n);
+  for (size_t i = 0; i < n; ++i) {
+    const double gear = g[g.size() == 1 ? 0 : i];
+    armature[i] = gear * gear * (*inertia)[inertia->size() == 1 ? 0 : i];
+  }
+  properties.emplace_back("armature", std::move(armature));
+}
+
+DofProperty property_from_name(const std::string& name) {
+  std::vector<std::string> known{"motor_inertia", "gear_ratio"};
+  for (const DofPropertyEntry& entry : dof_property_table) {
+    if (name == entry.name) return dof_property_from_name(name);
+    known.emplace_back(entry.name);
+  }
+  throw InputError("property '" + name + "' is unknown" + suggest(name, known));
+}
+
+}  // namespace
+
 LinkSpec make_link(std::string name, double mass, const Vec3<double>& com,
                    const Mat3<double>& inertia) {
   const auto& I = inertia.m;
@@ -26,6 +86,25 @@ AxisSpec make_axis(const std::string& kind, const Vec3<double>& axis, double pit
   throw InputError("axis kind '" + kind + "' is unknown; known: revolute, prismatic, helical");
 }
 
+void set_properties(JointSpec& joint, Properties properties) {
+  reflect_motor(properties);
+  for (auto& [name, values] : properties) {
+    const DofProperty property = property_from_name(name);
+    if (!values) continue;
+    const auto had = std::find_if(joint.dof.begin(), joint.dof.end(), [&](const DofValue& value) {
+      return value.property == property;
+    });
+    const double fallback = dof_property_table[static_cast<int>(property)].fallback;
+    const bool usual = values->size() == 1 && values->front() == fallback;
+    if (had != joint.dof.end() && usual)
+      joint.dof.erase(had);
+    else if (had != joint.dof.end())
+      had->values = std::move(*values);
+    else if (!usual)
+      joint.dof.push_back({property, std::move(*values)});
+  }
+}
+
 ModelBuilder::ModelBuilder(std::string name, const Vec3<double>& gravity, std::string source) {
   spec_.name = std::move(name);
   spec_.gravity = gravity;
@@ -36,12 +115,7 @@ void ModelBuilder::add_joint(JointSpec joint, const std::string& type, double pi
                              Properties properties) {
   try {
     joint.type = joint_type_from_name(type);
-    for (auto& [name, values] : properties) {
-      const DofProperty property = dof_property_from_name(name);
-      const double fallback = dof_property_table[static_cast<int>(property)].fallback;
-      if (!values || (values->size() == 1 && values->front() == fallback)) continue;
-      joint.dof.push_back({property, std::move(*values)});
-    }
+    set_properties(joint, std::move(properties));
   } catch (const InputError& error) {
     throw InputError("joint '" + joint.name + "'" + source_of(spec_) + ": " + error.what());
   }
@@ -90,6 +164,26 @@ ModelSpec make_chain(const EqualChain& chain) {
     for (int k = 0; k < std::max(1, info_of(chain.joint).n_axes); ++k)
       joint.axes.push_back({AxisKind::revolute, chain.axes[(i + k) % chain.axes.size()], 0});
     spec.joints.push_back(joint);
+  }
+  return spec;
+}
+
+ModelSpec with_joints(ModelSpec spec,
+                      std::vector<std::pair<std::string, Properties>> properties_of) {
+  std::unordered_map<std::string, JointSpec*> by_name;
+  for (JointSpec& joint : spec.joints) by_name.emplace(joint.name, &joint);
+  for (auto& [name, properties] : properties_of) {
+    const std::string head = "joint '" + name + "'" + source_of(spec) + ": ";
+    const auto found = by_name.find(name);
+    if (found == by_name.end())
+      throw InputError(head +
+                       "is the floating base, which has no properties; let the root link hang on a "
+                       "floating joint of the machine instead");
+    try {
+      set_properties(*found->second, std::move(properties));
+    } catch (const InputError& error) {
+      throw InputError(head + error.what());
+    }
   }
   return spec;
 }

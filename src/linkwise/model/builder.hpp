@@ -15,14 +15,21 @@ LinkSpec make_link(std::string name, double mass, const Vec3<double>& com,
 /// An axis of a composite joint; kind is "revolute", "prismatic" or "helical".
 AxisSpec make_axis(const std::string& kind, const Vec3<double>& axis, double pitch);
 
+/// Names of dof_property_table, or motor_inertia and gear_ratio, with one value, or one per degree
+/// of freedom, or nothing.
+using Properties = std::vector<std::pair<std::string, std::optional<std::vector<double>>>>;
+
+/// Gives a joint these properties; what is not named stays. motor_inertia J [kg m2] behind a gear
+/// of gear_ratio g (1 unless given) [rad/rad, rad/m] is the armature g^2 J. Throws InputError where
+/// a name is unknown or the armature is given in both ways.
+void set_properties(JointSpec& joint, Properties properties);
+
 class ModelBuilder {
  public:
   ModelBuilder(std::string name, const Vec3<double>& gravity, std::string source);
 
   void add_link(LinkSpec link) { spec_.links.push_back(std::move(link)); }
 
-  /// Property names of dof_property_table with one value, or one per degree of freedom, or nothing.
-  using Properties = std::vector<std::pair<std::string, std::optional<std::vector<double>>>>;
   /// A joint of a type given by its name; without axes it takes z, unless it is composite. Pitch is
   /// that of a helical joint, m/rad. Throws InputError where the type or a property is unknown.
   void add_joint(JointSpec joint, const std::string& type, double pitch, Properties properties);
@@ -50,6 +57,11 @@ struct EqualChain {
   bool floating_base = false;
 };
 ModelSpec make_chain(const EqualChain& chain);
+
+/// The same machine with other properties of some of its joints, each named with its own. Throws
+/// InputError where a joint has none that could be given, and as set_properties.
+ModelSpec with_joints(ModelSpec spec,
+                      std::vector<std::pair<std::string, Properties>> properties_of);
 
 /// The same machine with one more link welded to one of its links.
 ModelSpec with_payload(ModelSpec spec, const std::string& link, LinkSpec payload);

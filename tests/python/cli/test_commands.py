@@ -87,6 +87,14 @@ def test_inspect_json_has_everything(linkwise, arm):
         "upper": [1.5],
         "effort": [50],
         "velocity": [3],
+        "armature": [0],
+        "damping": [0],
+        "friction": [0],
+        "friction_velocity": [0.01],
+        "stiffness": [0],
+        "rest_position": [0],
+        "limit_stiffness": [0],
+        "limit_damping": [0],
     }
     assert slide["parent"] == "upper"
     assert slide["axes"][0]["kind"] == "prismatic"
