@@ -4,6 +4,7 @@
 namespace linkwise::bindings {
 
 void bind_builder(nanobind::module_& m);
+void bind_frame(nanobind::module_& m);
 void bind_model(nanobind::module_& m);
 void bind_dynamics(nanobind::module_& m);
 void bind_causes(nanobind::module_& m);

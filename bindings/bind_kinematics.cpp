@@ -5,21 +5,23 @@
 #include <nanobind/stl/string.h>
 
 #include "bind.hpp"
+#include "frame.hpp"
 #include "linkwise/dynamics/quantities.hpp"
 #include "linkwise/forces/passive.hpp"
+#include "linkwise/kinematics/frame_motion.hpp"
 #include "report.hpp"
 #include "states.hpp"
 
 namespace linkwise::bindings {
 namespace {
 
-/// f(model, q, v, out) for every state, over threads; out has `tail` numbers. v is zero where it
-/// is None.
+/// f(model, q, v, du, out) for every state, over threads; out has `tail` numbers. v and du are zero
+/// where they are None.
 template <class F>
-nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handle threads,
-                      const Shape& tail, F&& f) {
+nb::object map_motions(const PyModel& self, nb::handle q, nb::handle v, nb::handle acceleration,
+                       nb::handle threads, const Shape& tail, F&& f) {
   const Model& m = *self.model;
-  States s(m, q, v, nb::none(), "tau", nb::none());
+  States s(m, q, v, acceleration, "acceleration", nb::none());
   NewArray out(s.lead, tail);
   const size_t n = product(tail);
   const Executor executor = executor_for(whole_number(threads, "threads"), s.count * m.n_bodies());
@@ -28,11 +30,20 @@ nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handl
     for_each_part(m, s.count, executor, go_on, [&](size_t first, size_t count) {
       for (size_t i = first; i < first + count; ++i)
         f(m, s.q.data + i * m.nq(), s.v.given ? s.v.data + i * m.nv() : zero.data(),
-          out.data + i * n);
+          s.tau.given ? s.tau.data + i * m.nv() : zero.data(), out.data + i * n);
     });
   });
   check_result(out.data, s.count * n);
   return s.lead.empty() && tail.empty() ? nb::object(nb::float_(out.data[0])) : out.array;
+}
+
+/// The same with f(model, q, v, out).
+template <class F>
+nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handle threads,
+                      const Shape& tail, F&& f) {
+  return map_motions(self, q, v, nb::none(), threads, tail,
+                     [&f](const Model& m, const double* q, const double* v, const double*,
+                          double* out) { f(m, q, v, out); });
 }
 
 void bind_forces(nb::module_& m) {
@@ -161,8 +172,7 @@ int joint_of(const PyModel& self, nb::handle body) {
     joint = link.joint;
     if (joint < 0 || self.model->links[self.model->joints[joint].link].name != link.name)
       throw InputError("link '" + link.name +
-                       "' is welded and has no frame of its own; name the body that carries "
-                       "it (Model.notes)");
+                       "' is merged into the body that carries it; frame_jacobian takes any link");
   } else {
     joint = whole_number(body, "body").value_or(0);
     if (joint < 0 || joint >= self.model->n_joints())
@@ -222,7 +232,7 @@ Raises:
         const int joint = joint_of(self, body);
         return map_states(self, q, nb::none(), threads, {6, size(self.model->nv())},
                           [joint](const Model& m, const double* q, const double*, double* out) {
-                            body_jacobian(m, q, joint, out);
+                            frame_jacobian(m, q, {.joint = joint}, false, out);
                           });
       },
       "model"_a, "q"_a, "body"_a, nb::kw_only(), "threads"_a = nb::none(),
@@ -244,6 +254,147 @@ Raises:
         is not finite.)");
 }
 
+/// Whether components are along the world's axes, or the frame's.
+bool in_world(const std::string& axes) {
+  if (axes != "world" && axes != "frame")
+    throw InputError("axes: '" + axes + "' is unknown; use world or frame");
+  return axes == "world";
+}
+
+void store(const Motion<double>& m, double* out) {
+  const double values[6] = {m.lin.x, m.lin.y, m.lin.z, m.ang.x, m.ang.y, m.ang.z};
+  std::copy(values, values + 6, out);
+}
+
+void store(const Transform<double>& X, double* pose) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) pose[4 * i + j] = X.R.m[3 * j + i];
+  pose[3] = X.r.x;
+  pose[7] = X.r.y;
+  pose[11] = X.r.z;
+  for (int j = 0; j < 4; ++j) pose[12 + j] = j == 3;
+}
+
+/// The frame's motion, or one part of it, for every state.
+template <class Part>
+nb::object map_frame_motion(const PyModel& self, nb::handle q, nb::handle v,
+                            nb::handle acceleration, nb::handle frame, const std::string& axes,
+                            nb::handle threads, Part part) {
+  const FramePlacement at = place_frame(*self.model, as_frame(frame));
+  const bool world = in_world(axes);
+  return map_motions(
+      self, q, v, acceleration, threads, {6},
+      [&](const Model& m, const double* q, const double* v, const double* du, double* out) {
+        const FrameMotion found = frame_motion(m, q, v, du, at);
+        store(world ? in_world_axes(found.pose, found.*part) : found.*part, out);
+      });
+}
+
+void bind_frame_places(nb::module_& m) {
+  m.def(
+      "frame_pose",
+      [](const PyModel& self, nb::handle q, nb::handle frame, nb::handle threads) {
+        const FramePlacement at = place_frame(*self.model, as_frame(frame));
+        return map_states(self, q, nb::none(), threads, {4, 4},
+                          [&](const Model& m, const double* q, const double*, double* out) {
+                            store(frame_motion(m, q, nullptr, nullptr, at).pose, out);
+                          });
+      },
+      "model"_a, "q"_a, "frame"_a, nb::kw_only(), "threads"_a = nb::none(),
+      R"(Pose of a frame on any link.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m].
+    frame: a link's name, merged or not, or a Frame.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (..., 4, 4): matrix that takes points [m] of the frame to the world.
+
+Raises:
+    InputError: the link is unknown, shapes do not fit the model, or a number is not finite.)");
+  m.def(
+      "frame_jacobian",
+      [](const PyModel& self, nb::handle q, nb::handle frame, const std::string& axes,
+         nb::handle threads) {
+        const FramePlacement at = place_frame(*self.model, as_frame(frame));
+        const bool world = in_world(axes);
+        return map_states(self, q, nb::none(), threads, {6, size(self.model->nv())},
+                          [&](const Model& m, const double* q, const double*, double* out) {
+                            frame_jacobian(m, q, at, world, out);
+                          });
+      },
+      "model"_a, "q"_a, "frame"_a, nb::kw_only(), "axes"_a = "world", "threads"_a = nb::none(),
+      R"(Geometric Jacobian J of a frame on any link [featherstone2008, ch. 2]: J v is its velocity, and
+J^T f the joint torques of a force and moment f on it.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m].
+    frame: a link's name, merged or not, or a Frame.
+    axes: of the rows: "world", or "frame" for the frame's own.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    J (..., 6, nv): rows are the velocity of the frame's origin [m/s] and the angular velocity
+    [rad/s]. Zero on the ground.
+
+Raises:
+    InputError: the link is unknown, shapes do not fit the model, or a number is not finite.)");
+}
+
+void bind_frame_motions(nb::module_& m) {
+  m.def(
+      "frame_velocity",
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle frame, const std::string& axes,
+         nb::handle threads) {
+        return map_frame_motion(self, q, v, nb::none(), frame, axes, threads,
+                                &FrameMotion::velocity);
+      },
+      "model"_a, "q"_a, "v"_a, "frame"_a, nb::kw_only(), "axes"_a = "world",
+      "threads"_a = nb::none(),
+      R"(Velocity of a frame on any link against the world.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]. Leading axes broadcast.
+    frame: a link's name, merged or not, or a Frame.
+    axes: of the components: "world", or "frame" for the frame's own.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (..., 6): velocity of the frame's origin [m/s], then angular velocity [rad/s].
+
+Raises:
+    InputError: the link is unknown, shapes do not fit the model, or a number is not finite.)");
+  m.def(
+      "frame_acceleration",
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle acceleration, nb::handle frame,
+         const std::string& axes, nb::handle threads) {
+        return map_frame_motion(self, q, v, acceleration, frame, axes, threads,
+                                &FrameMotion::acceleration);
+      },
+      "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), "frame"_a, nb::kw_only(),
+      "axes"_a = "world", "threads"_a = nb::none(),
+      R"(Acceleration of a frame on any link against the world, without gravity.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]; acceleration: of the joints
+        (..., nv) [rad/s2, m/s2]. Leading axes broadcast; None: zero.
+    frame: a link's name, merged or not, or a Frame.
+    axes: of the components: "world", or "frame" for the frame's own.
+    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+
+Returns:
+    (..., 6): second derivative of the origin's position [m/s2], then angular acceleration
+    [rad/s2]. An accelerometer there feels the first less gravity.
+
+Raises:
+    InputError: the link is unknown, shapes do not fit the model, or a number is not finite.)");
+}
+
 }  // namespace
 
 void bind_kinematics(nb::module_& m) {
@@ -252,6 +403,8 @@ void bind_kinematics(nb::module_& m) {
   bind_forces(m);
   bind_energies(m);
   bind_poses(m);
+  bind_frame_places(m);
+  bind_frame_motions(m);
 }
 
 }  // namespace linkwise::bindings

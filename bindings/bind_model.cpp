@@ -4,6 +4,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "bind.hpp"
+#include "frame.hpp"
 #include "linkwise/model/builder.hpp"
 #include "printable.hpp"
 #include "py_model.hpp"
@@ -314,7 +315,7 @@ void bind_links(ModelClass& c) {
          for (const auto& l : s.model->links) out.append(l.name);
          return out;
        },
-       "Every link of the source, merged ones included.")
+       "Every link of the source, merged ones included; each name stands for the link's frame.")
       .def_prop_ro(
           "link_masses",
           [](const PyModel& s) {
@@ -428,6 +429,7 @@ void bind_model(nb::module_& m) {
   bind_places(c);
   bind_dof_properties(c);
   bind_links(c);
+  bind_frame_placement(c);
   bind_variants(c);
   bind_storage(c);
 }

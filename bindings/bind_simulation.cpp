@@ -148,10 +148,10 @@ void bind_drives(nb::class_<PySimulation>& simulation) {
            "values"_a, "interpolation"_a = "linear")
       .def("drive_locked", &PySimulation::locked, "joint"_a)
       .def("drive_free", &PySimulation::free, "joint"_a)
-      .def("wrench", &PySimulation::wrench, "body"_a, "value"_a, "frame"_a = "world")
-      .def("wrench_table", &PySimulation::wrench_table, "body"_a, "times"_a, "values"_a,
+      .def("wrench", &PySimulation::wrench, "at"_a, "value"_a, "frame"_a = "world")
+      .def("wrench_table", &PySimulation::wrench_table, "at"_a, "times"_a, "values"_a,
            "interpolation"_a = "linear", "frame"_a = "world")
-      .def("wrench_callable", &PySimulation::wrench_callable, "body"_a, "fn"_a, "frame"_a = "world",
+      .def("wrench_callable", &PySimulation::wrench_callable, "at"_a, "fn"_a, "frame"_a = "world",
            "breakpoints"_a = nb::none(), "samples"_a = nb::none());
 }
 

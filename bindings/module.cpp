@@ -31,6 +31,7 @@ Raises:
     InputError: complex numbers, truth values, text, dates, records, objects, masked values. NumPy
         would turn most of them into numbers without a word.)");
   linkwise::bindings::bind_builder(m);
+  linkwise::bindings::bind_frame(m);
   linkwise::bindings::bind_model(m);
   linkwise::bindings::bind_dynamics(m);
   linkwise::bindings::bind_causes(m);

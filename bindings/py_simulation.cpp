@@ -4,6 +4,8 @@
 
 #include <nanobind/stl/string.h>
 
+#include "frame.hpp"
+
 namespace linkwise::bindings {
 namespace {
 
@@ -95,19 +97,18 @@ FunctionCourse course_of(nb::handle breakpoints, nb::handle samples, size_t colu
 }
 
 /// Without its value yet.
-Wrench wrench_on(const Model& model, const std::string& body, const std::string& frame) {
+Wrench wrench_at(const Model& model, const Frame& at, const std::string& frame) {
   if (frame != "world" && frame != "body")
     throw InputError("frame '" + frame + "' is unknown; known: world, body");
-  const LinkInfo& link = model.links[model.link_index(body)];
-  if (link.joint < 0 || model.links[model.joints[link.joint].link].name != body)
-    throw InputError("link '" + body + "'" + model.where() +
-                     " is welded to another; apply the wrench to '" +
-                     (link.joint < 0 ? std::string("a moving body")
-                                     : model.links[model.joints[link.joint].link].name) +
-                     "'");
+  const FramePlacement place = place_frame(model, at);
+  if (place.joint < 0)
+    throw InputError("link '" + at.link + "'" + model.where() +
+                     " is fixed to the ground, where a wrench moves nothing; give a frame on a "
+                     "moving link");
   Wrench w;
-  w.joint = link.joint;
+  w.joint = place.joint;
   w.world = frame == "world";
+  w.placement = place.placement;
   return w;
 }
 
@@ -213,27 +214,27 @@ void PySimulation::locked(const std::string& joint) {
 
 void PySimulation::free(const std::string& joint) { set(joint, {}); }
 
-void PySimulation::wrench(const std::string& body, nb::handle value, const std::string& frame) {
-  Wrench w = wrench_on(*model, body, frame);
+void PySimulation::wrench(nb::handle at, nb::handle value, const std::string& frame) {
+  Wrench w = wrench_at(*model, as_frame(at), frame);
   w.value = constants(value, "wrench", 6);
   simulation.add_wrench(std::move(w));
 }
 
-void PySimulation::wrench_table(const std::string& body, nb::handle times, nb::handle values,
+void PySimulation::wrench_table(nb::handle at, nb::handle times, nb::handle values,
                                 const std::string& interpolation, const std::string& frame) {
-  Wrench w = wrench_on(*model, body, frame);
+  Wrench w = wrench_at(*model, as_frame(at), frame);
   w.table = make_table(times, values, interpolation, 6);
   simulation.add_wrench(std::move(w));
 }
 
-void PySimulation::wrench_callable(const std::string& body, nb::callable fn,
-                                   const std::string& frame, nb::handle breakpoints,
-                                   nb::handle samples) {
-  Wrench w = wrench_on(*model, body, frame);
+void PySimulation::wrench_callable(nb::handle at, nb::callable fn, const std::string& frame,
+                                   nb::handle breakpoints, nb::handle samples) {
+  const Frame where = as_frame(at);
+  Wrench w = wrench_at(*model, where, frame);
   w.course = course_of(breakpoints, samples, 6);
-  w.callable = [fn, body](double t, double* out) {
+  w.callable = [fn, link = where.link](double t, double* out) {
     const nb::gil_scoped_acquire acquire;
-    store(fn(t), "wrench returned for body '" + body + "'", out, 6);
+    store(fn(t), "wrench returned for link '" + link + "'", out, 6);
   };
   simulation.add_wrench(std::move(w));
 }

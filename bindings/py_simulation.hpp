@@ -30,10 +30,10 @@ class PySimulation {
                 const std::string& interpolation);
   void locked(const std::string& joint);
   void free(const std::string& joint);
-  void wrench(const std::string& body, nb::handle value, const std::string& frame);
-  void wrench_table(const std::string& body, nb::handle times, nb::handle values,
+  void wrench(nb::handle at, nb::handle value, const std::string& frame);
+  void wrench_table(nb::handle at, nb::handle times, nb::handle values,
                     const std::string& interpolation, const std::string& frame);
-  void wrench_callable(const std::string& body, nb::callable fn, const std::string& frame,
+  void wrench_callable(nb::handle at, nb::callable fn, const std::string& frame,
                        nb::handle breakpoints, nb::handle samples);
   void start(double t0, nb::handle q, nb::handle v);
 

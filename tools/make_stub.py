@@ -29,13 +29,15 @@ TARGETS: tuple[str, ...]
 
 # Parameters that a binding takes as a Python object, by their name.
 ARRAYS = (
-    "acceleration axes axis breakpoints com external f gravity guess inertia initial prescribed q "
-    "q0 rotation target tau times translation v v0 value values"
+    "acceleration axes axis breakpoints com external f gravity guess inertia initial origin "
+    "prescribed q q0 rotation target tau times translation v v0 value values"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "arg": "Any",  # without a name: what pickling has kept
     "axes": "Any",  # joint axes: one per direction, or none
+    "at": "str | Frame",
     "body": "str | int",
+    "frame": "str | Frame",
     "samples": "tuple[npt.ArrayLike, npt.ArrayLike]",
     "fn": "Callable[..., Any]",
     "mass": "float",
@@ -60,7 +62,9 @@ RETURNS = {
     "ConstraintSystem.sparse": "Any",
     "DynamicsMethod.evaluate": "tuple[Array, Array, Report]",
     "DynamicsMethod.follow": "dict[str, Any]",
+    "Frame.__getstate__": "tuple[str, Array, Array]",
     "Model.child_link_names": "list[str]",
+    "Model.frame_placement": "tuple[str | None, Array, Array]",
     "Model.joint_labels": "tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str], ...]]",
     "Model.joint_axes": "list[list[tuple[str, tuple[float, float, float]]]]",
     "Model.joint_names": "list[str]",

@@ -3,7 +3,6 @@
 from linkwise.drives.drive import (
     PD,
     Drive,
-    Frame,
     Free,
     Interpolation,
     Locked,
@@ -12,6 +11,7 @@ from linkwise.drives.drive import (
     Table,
     Torque,
     Wrench,
+    WrenchAxes,
     as_drive,
     as_wrench,
 )
@@ -19,7 +19,6 @@ from linkwise.drives.drive import (
 __all__ = [
     "PD",
     "Drive",
-    "Frame",
     "Free",
     "Interpolation",
     "Locked",
@@ -28,6 +27,7 @@ __all__ = [
     "Table",
     "Torque",
     "Wrench",
+    "WrenchAxes",
     "as_drive",
     "as_wrench",
 ]

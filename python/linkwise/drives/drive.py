@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from linkwise._core import InputError, as_floats
+from linkwise._core import Frame, InputError, as_floats
 from linkwise.base import Array
 from linkwise.drives.course import (
     Span,
@@ -29,7 +29,7 @@ from linkwise.io.table import read_table
 if TYPE_CHECKING:
     from linkwise._core import Model
 Interpolation = Literal["linear", "cubic"]
-Frame = Literal["world", "body"]
+WrenchAxes = Literal["world", "body"]
 
 
 def _finite(value: npt.ArrayLike, what: str) -> Array:
@@ -171,7 +171,7 @@ def check_derivatives(motion: Callable[[float], Any], times: Array) -> Array:
 def _hand_over(
     simulation: Any,
     setter: str,
-    name: str,
+    name: str | Frame,
     value: Any,
     known: Callable[[Callable[..., Any]], dict[str, Any]],
     **more: Any,
@@ -387,21 +387,27 @@ class Free(Drive):
 
 @dataclass(frozen=True, eq=False)
 class Wrench:
-    """An external force and moment on a body, at the origin of its frame.
+    """An external force and moment at the origin of a frame on any link.
 
     value: [fx fy fz nx ny nz] in N and N m, or a Table of these six, or a function ``value(t)``.
-    frame: the axes of the components, "world" or "body".
+    frame: the axes of the components, "world", or "body" for those of the frame where it acts.
+    at: where it acts, a link's name or a Frame; None: the frame that it is given for.
     breakpoints: Of a function, as for `Torque`.
     """
 
     value: npt.ArrayLike | Table | Callable[[float], npt.ArrayLike]
-    frame: Frame = field(default="world")
+    frame: WrenchAxes = field(default="world")
+    at: str | Frame | None = field(default=None, kw_only=True)
     breakpoints: npt.ArrayLike | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "breakpoints", as_breakpoints(self.breakpoints, "wrench"))
         if self.frame not in ("world", "body"):
             raise InputError(f"wrench frame: '{self.frame}' is unknown; use world or body")
+        if self.at is not None and not isinstance(self.at, str | Frame):
+            raise InputError(
+                f"wrench at: {self.at!r} is no frame; give the name of a link, or a linkwise.Frame"
+            )
         if isinstance(self.value, Table):
             shape: tuple[int, ...] = self.value.values.shape[1:]
         elif callable(self.value):
@@ -416,14 +422,15 @@ class Wrench:
         """What the reader of a simulation from 0 to `end` [s] should know of this wrench."""
         return _notes(self.value, self.breakpoints, end)
 
-    def apply(self, simulation: Any, body: str, span: Span | None = None) -> None:
-        """Set this wrench on ``body`` of a ``_core.Simulation``; a function is looked at over the
-        span, where it is given."""
+    def apply(self, simulation: Any, frame: str | Frame, span: Span | None = None) -> None:
+        """Set this wrench on a ``_core.Simulation``, at ``frame`` unless it says itself where; a
+        function is looked at over the span, where it is given."""
 
         def known(function: Callable[..., Any]) -> dict[str, Any]:
             return course(function, self.breakpoints, span)
 
-        _hand_over(simulation, "wrench", body, self.value, known, frame=self.frame)
+        at = frame if self.at is None else self.at
+        _hand_over(simulation, "wrench", at, self.value, known, frame=self.frame)
 
 
 def as_drive(value: Any) -> Drive:

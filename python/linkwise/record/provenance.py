@@ -17,6 +17,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
+from linkwise._core import Frame
 from linkwise.notes import warning_attrs, warnings_of
 
 if TYPE_CHECKING:
@@ -63,6 +64,9 @@ def describe(drive: Any) -> dict[str, Any]:
         if hasattr(value, "times"):
             span = [float(value.times[0]), float(value.times[-1])]
             told[field.name] = {"table": list(value.values.shape), "times": span}
+        elif isinstance(value, Frame):
+            axes = value.axes.tolist()
+            told[field.name] = {"link": value.link, "origin": value.origin.tolist(), "axes": axes}
         elif callable(value):
             told[field.name] = f"function {getattr(value, '__qualname__', type(value).__name__)}"
         else:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise import drives
-from linkwise._core import InputError, Model, integrators, methods, solvers
+from linkwise._core import Frame, InputError, Model, integrators, methods, solvers
 from linkwise.base import COMPONENTS
 from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.mjcf_state import read_keyframe
@@ -272,29 +272,36 @@ class ArgumentBuilder:
             found[joint] = Rating(**section.model_dump())
         return found
 
-    def body_wrenches(self) -> dict[str, drives.Wrench]:
-        """External wrenches by body name."""
-        bodies = set(self.model.child_link_names) | set(self.model.link_names)
+    def wrenches(self) -> dict[str, drives.Wrench]:
+        """External wrenches by their names in the file."""
+        sections = self.source.settings.wrench
+        links = self.model.link_names if sections else []
+        known = set(links)
         result = {}
-        for body, section in self.source.settings.wrench.items():
-            if body not in bodies:
+        for name, section in sections.items():
+            keys: tuple[str, ...] = ("wrench", name)
+            if section.link is None and name not in known:
+                remedy = near(name, links, "the links are")
                 self.source.complain(
-                    ("wrench", body),
-                    "the model has no such body",
-                    near(body, self.model.child_link_names, "the bodies are"),
+                    keys, "is no link of the model and names none", f"add link = ..., or {remedy}"
                 )
-            result[body] = self._wrench(section, ("wrench", body))
+            if section.link is not None:
+                _check_link(self.source, self.model, section.link, (*keys, "link"))
+            result[name] = self._wrench(name, section)
         return result
 
-    def _wrench(self, section: WrenchSection, keys: tuple[str, str]) -> drives.Wrench:
+    def _wrench(self, name: str, section: WrenchSection) -> drives.Wrench:
+        at = Frame(section.link or name, section.point, section.axes)
+        frame = section.frame or ("world" if section.axes is None else "body")
         if section.table is None:
             zero = [Quantity(0.0, None)] * 3
             parts = [*(section.force or zero), *(section.moment or zero)]
-            return drives.Wrench([p.value for p in parts], section.frame)
+            return drives.Wrench([p.value for p in parts], frame, at=at)
         names = section.columns or COMPONENTS
         units = ["m", "m", "m", "rad", "rad", "rad"]
+        keys = ("wrench", name)
         table = self._table(section.table, names, units, section.interpolation, keys, "torque")
-        return drives.Wrench(table, section.frame)
+        return drives.Wrench(table, frame, at=at)
 
     # -- tables -----------------------------------------------------------------------------
 

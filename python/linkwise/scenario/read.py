@@ -88,7 +88,7 @@ class Scenario(ScenarioSource):
         return {
             **builder.simulate(),
             "drives": builder.joint_drives(),
-            "wrenches": builder.body_wrenches(),
+            "wrenches": builder.wrenches(),
             "q0": builder.state("position"),
             "v0": builder.state("velocity"),
             "every": output.every,

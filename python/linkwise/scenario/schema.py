@@ -208,15 +208,27 @@ DRIVES: dict[str, type[Section]] = {
 }
 
 
-class WrenchSection(_Tabled):
-    """A force and moment on a body, constant or from a table of six columns."""
+Point = Annotated[list[Annotated[float, _of("length")]], Field(min_length=3, max_length=3)]
+Angles = Annotated[list[Annotated[float, _of("angle")]], Field(min_length=3, max_length=3)]
 
+
+class WrenchSection(_Tabled):
+    """A force and moment at a point of a link, constant or from a table of six columns.
+
+    Where no link is given, the section's name is one. axes: roll, pitch, yaw against the link's.
+    """
+
+    link: str | None = None
+    point: Point | None = None
+    axes: Angles | None = None
     force: list[Scalar] | None = Field(default=None, min_length=3, max_length=3)
     moment: list[Scalar] | None = Field(default=None, min_length=3, max_length=3)
-    frame: Literal["world", "body"] = "world"
+    frame: Literal["world", "body"] | None = None
 
     @model_validator(mode="after")
     def _one(self) -> WrenchSection:
+        if self.axes is not None and self.frame == "world":
+            raise ValueError('has axes of its own and frame = "world"; keep one of them')
         self._check_table("force or moment", self.force is not None or self.moment is not None)
         if self.columns is not None and len(self.columns) != 6:
             raise ValueError(f"columns has {len(self.columns)} names; name six: fx fy fz nx ny nz")
@@ -229,7 +241,6 @@ class WrenchSection(_Tabled):
 
 
 Mass = Annotated[float, _of("number", "mass"), Field(ge=0)]
-Point = Annotated[list[Annotated[float, _of("length")]], Field(min_length=3, max_length=3)]
 Inertia = Annotated[
     list[Annotated[float, _of("number", "inertia")]], Field(min_length=3, max_length=6)
 ]

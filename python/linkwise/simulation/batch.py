@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise import _core
-from linkwise._core import InputError, Model, as_floats
+from linkwise._core import Frame, InputError, Model, as_floats
 from linkwise.base import Array
 from linkwise.notes import tell, warning_attrs, warnings_of
 from linkwise.record.provenance import plain, provenance
@@ -111,7 +111,7 @@ def simulate_batch(
     v0: npt.ArrayLike | None = None,
     tau: npt.ArrayLike | None = None,
     drives: Mapping[str, Drive | Any] | None = None,
-    wrenches: Mapping[str, Wrench] | None = None,
+    wrenches: Mapping[str | Frame, Wrench | Any] | None = None,
     every: float | None = None,
     times: npt.ArrayLike | None = None,
     integrator: str = "runge_kutta_4",
@@ -168,9 +168,9 @@ def simulate_batch(
     options: dict[str, Any] = {"integrator": integrator, "step": number("step", step)}
     simulations = []
     for one in models:
-        by_joint, by_body = check_driven(one, drives, wrenches)
+        by_joint, by_name = check_driven(one, drives, wrenches)
         simulation = _core.Simulation(one, **options, method="articulated_body", threads=1)
-        notes = set_driven(simulation, one, by_joint, by_body, float(sampled[-1]))
+        notes = set_driven(simulation, one, by_joint, by_name, float(sampled[-1]))
         simulations.append(simulation)
     lead, rows = _members(given, len(models))
     lead = lead if isinstance(model, Model) else (len(models), *lead)

@@ -7,17 +7,17 @@ import json
 import os
 import time as clock
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from linkwise import _core
-from linkwise._core import InputError
+from linkwise._core import Frame, InputError
 from linkwise.base import Array
 from linkwise.drives import as_drive, as_wrench
 from linkwise.drives.course import Span
-from linkwise.io.complaint import near
 from linkwise.notes import Ignored, tell, warning_attrs, warnings_of
 from linkwise.record.claim import check_target
 from linkwise.record.memory import MemoryRecord
@@ -62,33 +62,46 @@ class SimulationInterrupted(_Stopped, KeyboardInterrupt):
 
 
 def check_driven(
-    model: Model, drives: Mapping[str, Any] | None, wrenches: Mapping[str, Any] | None
+    model: Model, drives: Mapping[str, Any] | None, wrenches: Mapping[Any, Any] | None
 ) -> tuple[dict[str, Drive], dict[str, Wrench]]:
-    """Drives by joint and wrenches by body; unknown names and unusable values are refused."""
-    by_joint, by_body = {}, {}
+    """Drives by joint and wrenches by name, each with its frame; unknown names and unusable values
+    are refused."""
+    by_joint, by_name = {}, {}
     for joint, drive in (drives or {}).items():
         model.joint_index(joint)
         try:
             by_joint[joint] = as_drive(drive)
         except InputError as error:
             raise InputError(f"drives[{joint!r}]: {error}") from None
-    bodies = {*model.child_link_names, *model.link_names} if wrenches else set()
-    for body, wrench in (wrenches or {}).items():
-        if body not in bodies:
-            known = near(body, model.child_link_names)
-            raise InputError(f"wrenches: unknown body {body!r}; {known}")
+    for frame, wrench in (wrenches or {}).items():
+        name = str(frame)
         try:
-            by_body[body] = as_wrench(wrench)
+            by_name[name] = _placed(as_wrench(wrench), frame)
+            wrenched_bodies(model, {name: by_name[name]})
         except InputError as error:
-            raise InputError(f"wrenches[{body!r}]: {error}") from None
-    return by_joint, by_body
+            raise InputError(f"wrenches[{name!r}]: {error}") from None
+    return by_joint, by_name
+
+
+def _placed(wrench: Wrench, frame: Any) -> Wrench:
+    """The wrench with the frame where it acts: its own, or the one that it was given for."""
+    at = frame if wrench.at is None else wrench.at
+    if wrench.at is not None and not isinstance(frame, str):
+        raise InputError("is given for a frame and has another one; leave one of them out")
+    return replace(wrench, at=Frame(at) if isinstance(at, str) else at)
+
+
+def wrenched_bodies(model: Model, wrenches: Mapping[str, Wrench]) -> set[str]:
+    """The bodies that the wrenches act on, once these are checked."""
+    bodies = (model.frame_placement(wrench.at)[0] for wrench in wrenches.values() if wrench.at)
+    return {body for body in bodies if body is not None}
 
 
 def set_driven(
     simulation: Simulation,
     model: Model,
     by_joint: Mapping[str, Drive],
-    by_body: Mapping[str, Wrench],
+    by_name: Mapping[str, Wrench],
     end: float,
     start: tuple[Array, Array] | None = None,
 ) -> list[Ignored]:
@@ -109,12 +122,12 @@ def set_driven(
         except InputError as error:
             raise InputError(f"drives[{joint!r}]: {error}") from None
         notes += [Ignored("", f"drives[{joint!r}]", note) for note in drive.notes(end)]
-    for body, wrench in by_body.items():
+    for name, wrench in by_name.items():
         try:
-            wrench.apply(simulation, body, None if start is None else Span(end))
+            wrench.apply(simulation, name, None if start is None else Span(end))
         except InputError as error:
-            raise InputError(f"wrenches[{body!r}]: {error}") from None
-        notes += [Ignored("", f"wrenches[{body!r}]", note) for note in wrench.notes(end)]
+            raise InputError(f"wrenches[{name!r}]: {error}") from None
+        notes += [Ignored("", f"wrenches[{name!r}]", note) for note in wrench.notes(end)]
     return notes
 
 
@@ -124,7 +137,7 @@ def _chosen(
     """Attributes that the prepared simulation adds to the provenance."""
     return {
         "drives": json.dumps({joint: describe(drive) for joint, drive in drives.items()}),
-        "wrenches": json.dumps({body: describe(wrench) for body, wrench in wrenches.items()}),
+        "wrenches": json.dumps({name: describe(wrench) for name, wrench in wrenches.items()}),
         "method": simulation.method,
         "solver": simulation.solver or "none",
         "reason": simulation.reason,
@@ -205,7 +218,7 @@ def simulate(
     *,
     duration: float | None = None,
     drives: Mapping[str, Drive | Any] | None = None,
-    wrenches: Mapping[str, Wrench] | None = None,
+    wrenches: Mapping[str | Frame, Wrench | Any] | None = None,
     q0: npt.ArrayLike | None = None,
     v0: npt.ArrayLike | None = None,
     every: float | None = None,
@@ -227,7 +240,10 @@ def simulate(
         drives: Per joint name a drive (`Torque`, `PD`, `Locked`, `Free`), or what makes a `Torque`:
             a number, one number per degree of freedom, or a callable `f(t, q, v)` of the joint's
             own coordinates and velocities. Joints without a drive move freely.
-        wrenches: Per body name an external `Wrench`.
+        wrenches: Per frame an external `Wrench`, or what makes one along the world's axes: six
+            numbers, a `Table`, a function of time. A frame is the name of any link, merged ones
+            too, or a `Frame`. A wrench that says itself where it acts (`at=`) may have any name.
+            Those on one body add up.
         q0: Initial coordinates, shape (nq,); the model's
             `initial_configuration()` by default.
         v0: Initial velocities, shape (nv,); zero by default.
@@ -262,12 +278,13 @@ def simulate(
         state_vector("q0", q0, model.nq, model.initial_configuration()),
         state_vector("v0", v0, model.nv, np.zeros(model.nv)),
     )
-    by_joint, by_body = check_driven(model, drives, wrenches)
+    by_joint, by_name = check_driven(model, drives, wrenches)
     recording = Recording.of(record, options)
     chosen = options_object("numerics", Numerics, numerics, options)
     for name in options:
         raise TypeError(f"simulate() got an unexpected keyword argument {name!r}")
-    schema = build_schema(model, recording.quantities, recording.joints, by_body)
+    wrenched = wrenched_bodies(model, by_name)
+    schema = build_schema(model, recording.quantities, recording.joints, wrenched)
     if on_failure not in ("raise", "return"):
         raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
     if output is not None:
@@ -276,7 +293,7 @@ def simulate(
     options = chosen.options(tolerance)
     count = optional_count("threads", threads)
     simulation = _core.Simulation(model, **options, threads=count)
-    notes = set_driven(simulation, model, by_joint, by_body, float(sampled[-1]), start)
+    notes = set_driven(simulation, model, by_joint, by_name, float(sampled[-1]), start)
     simulation.start(0.0, *start)
     attrs = provenance(
         model,
@@ -291,7 +308,7 @@ def simulate(
         scenario=recording.scenario_text,
         cpu_target=_core.cpu_target,
     )
-    attrs |= _chosen(simulation, by_joint, by_body)
+    attrs |= _chosen(simulation, by_joint, by_name)
     attrs |= warning_attrs([*notes, *warnings_of(model)])
     if output is None:
         _require_memory(schema, sampled.size)

@@ -66,28 +66,6 @@ void link_poses(const Model& model, const double* q, double* poses) {
   }
 }
 
-void body_jacobian(const Model& model, const double* q, int joint, double* J) {
-  const int nv = model.nv();
-  for (int i = 0; i < 6 * nv; ++i) J[i] = 0;
-  const JointInfo& info = model.joints[joint];
-  Transform<double> X = info.to_user;
-  int body = info.body, last = info.first_element + info.n_elements - 1;
-  for (;;) {
-    for (int i = last; i >= model.topology[body].first_element; --i) {
-      const Element& e = model.elements[i];
-      for (int k = 0; k < e.nv; ++k) {
-        const Motion<double> c = X * element_column<double>(e, k);
-        const double column[6] = {c.lin.x, c.lin.y, c.lin.z, c.ang.x, c.ang.y, c.ang.z};
-        for (int r = 0; r < 6; ++r) J[r * nv + e.v + k] = column[r];
-      }
-      X = X * element_pose(e, q);
-    }
-    body = model.topology[body].parent;
-    if (body < 0) return;
-    last = model.topology[body].first_element + model.topology[body].n_elements - 1;
-  }
-}
-
 double kinetic_energy(const Model& model, const double* q, const double* v) {
   const auto states = states_of(model, q, v);
   double energy = 0;

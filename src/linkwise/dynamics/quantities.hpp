@@ -9,8 +9,6 @@ namespace linkwise {
 void joint_poses(const Model& model, const double* q, double* poses);
 /// Pose of every link of the file, merged ones too, [n_links][16].
 void link_poses(const Model& model, const double* q, double* poses);
-/// 6 x nv, row-major: v of joint `joint`'s outboard frame in its own axes, linear first, = J u.
-void body_jacobian(const Model& model, const double* q, int joint, double* J);
 /// 1/2 sum v^T M v + 1/2 sum armature u^2, J.
 double kinetic_energy(const Model& model, const double* q, const double* v);
 /// -sum m g . r + springs + compliant stops, J; gravity's zero is the world origin.

@@ -128,17 +128,19 @@ void add_wrenches(const Model&, const std::vector<Wrench>& wrenches, double t, c
       wrench.callable(t, w);
     else
       std::copy(wrench.value.begin(), wrench.value.end(), w);
-    double* out = external + 6 * wrench.joint;
-    if (!wrench.world) {
-      for (int i = 0; i < 6; ++i) out[i] += w[i];
-      continue;
+    Force<double> f{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
+    if (wrench.world) {
+      const double* pose = poses + 16 * wrench.joint;
+      const Mat3<double> R{
+          {pose[0], pose[1], pose[2], pose[4], pose[5], pose[6], pose[8], pose[9], pose[10]}};
+      f = {transpose_times(R, f.lin), transpose_times(R, f.ang)};
+      f.ang += cross(wrench.placement.r, f.lin);
+    } else {
+      f = transpose_times(wrench.placement, f);
     }
-    const double* pose = poses + 16 * wrench.joint;
-    for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) {
-        out[i] += pose[4 * k + i] * w[k];
-        out[3 + i] += pose[4 * k + i] * w[3 + k];
-      }
+    double* out = external + 6 * wrench.joint;
+    const double sum[6] = {f.lin.x, f.lin.y, f.lin.z, f.ang.x, f.ang.y, f.ang.z};
+    for (int i = 0; i < 6; ++i) out[i] += sum[i];
   }
 }
 

@@ -39,8 +39,10 @@ struct Drive {
 };
 
 struct Wrench {
-  int joint = 0;  ///< the body is this joint's child
-  bool world = true;
+  int joint = 0;      ///< the body is this joint's child
+  bool world = true;  ///< along the world's axes, or those of the frame where it acts
+  /// The joint's user frame -> the frame where it acts.
+  Transform<double> placement{Mat3<double>::identity(), {}};
   std::vector<double> value;
   std::optional<Table> table;
   std::function<void(double, double*)> callable;
@@ -67,7 +69,7 @@ Breakpoints breakpoints(const Wrench& wrench, double tolerance, double largest);
 double largest_action(const Drive& drive);
 double largest_action(const Wrench& wrench);
 
-/// Adds the wrenches to external [n_joints][6], in the joints' outboard frames.
+/// Adds the wrenches to external [n_joints][6], at and in the joints' outboard frames.
 void add_wrenches(const Model& model, const std::vector<Wrench>& wrenches, double t,
                   const double* poses, double* external);
 

@@ -147,25 +147,29 @@ void validate_link(const LinkSpec& link, const std::string& where, std::vector<N
          "principal moments of inertia break the triangle inequality: no real body has them"});
 }
 
+void require_rotation(const Mat3<double>& R, const std::string& what) {
+  double worst = 0;
+  const Mat3<double> product = transpose(R) * R;
+  for (int i = 0; i < 9; ++i) {
+    if (!std::isfinite(R.m[i]))
+      throw InputError(what + " is not finite; give a 3x3 rotation matrix");
+    worst = std::max(worst, std::abs(product.m[i] - (i % 4 == 0)));
+  }
+  const auto& r = R.m;
+  const double det = r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) +
+                     r[2] * (r[3] * r[7] - r[4] * r[6]);
+  if (worst > 1e-6 || det < 0)
+    throw InputError(what +
+                     " is not a rotation matrix; give an orthonormal right-handed 3x3 matrix");
+}
+
 void validate_joint(JointSpec& joint, const std::string& where) {
   const std::string head = "joint '" + joint.name + "'" + where + ": ";
   if (joint.name.empty())
     throw InputError("a joint" + where + " has an empty name; give every joint a name");
   if (!finite(joint.translation))
     throw InputError(head + "translation is not finite; give three finite numbers in m");
-  double worst = 0;
-  const Mat3<double> product = transpose(joint.rotation) * joint.rotation;
-  for (int i = 0; i < 9; ++i) {
-    if (!std::isfinite(joint.rotation.m[i]))
-      throw InputError(head + "rotation is not finite; give a 3x3 rotation matrix");
-    worst = std::max(worst, std::abs(product.m[i] - (i % 4 == 0)));
-  }
-  const auto& R = joint.rotation.m;
-  const double det = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6]) +
-                     R[2] * (R[3] * R[7] - R[4] * R[6]);
-  if (worst > 1e-6 || det < 0)
-    throw InputError(
-        head + "rotation is not a rotation matrix; give an orthonormal right-handed 3x3 matrix");
+  require_rotation(joint.rotation, head + "rotation");
   const int n_axes = static_cast<int>(joint.axes.size()), expected = info_of(joint.type).n_axes;
   if (n_axes < std::abs(expected))
     throw InputError(head + "has " + std::to_string(n_axes) + " axes; a " +

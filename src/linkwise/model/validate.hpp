@@ -21,6 +21,9 @@ bool clearly_negative(double mass, const double principal[3]);
 /// the welded links are summed.
 void validate_link(const LinkSpec& link, const std::string& where, std::vector<Note>& notes);
 
+/// Throws InputError, which begins with `what`, unless the matrix is orthonormal and right-handed.
+void require_rotation(const Mat3<double>& R, const std::string& what);
+
 /// Throws InputError on non-finite numbers, a placement that is no rotation, or a zero or missing
 /// axis; normalises the axes.
 void validate_joint(JointSpec& joint, const std::string& where);

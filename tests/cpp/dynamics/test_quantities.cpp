@@ -5,6 +5,7 @@
 #include "dynamics/dynamics_case.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/quantities.hpp"
+#include "linkwise/kinematics/frame_motion.hpp"
 
 namespace linkwise::testing {
 namespace {
@@ -42,20 +43,42 @@ TEST_P(Quantities, PosesAreTheTwins) {
     expect_close(part(links, l), flat(motions.pose[l]), 1e-13, "pose of " + model.links[l].name);
 }
 
-TEST_P(Quantities, JacobiansGiveTheTwinsVelocities) {
+/// Velocity of a point p of a link in the world, and the link's turning.
+Motion<double> velocity_at(const Screw<double>& v, const Vec3<double>& p) {
+  return {v.s + cross(v.w, p), v.w};
+}
+
+std::vector<double> numbers(const Motion<double>& m) {
+  return {m.lin.x, m.lin.y, m.lin.z, m.ang.x, m.ang.y, m.ang.z};
+}
+
+TEST_P(Quantities, JacobiansAndVelocitiesOfFramesAreTheTwins) {
+  constexpr double tolerance = 1e-12;  // what axes may differ by that count as parallel
+  Draws draws(57);
   const size_t nv = model.nv();
   std::vector<double> J(6 * nv);
-  for (int j = 0; j < model.n_joints(); ++j) {
-    body_jacobian(model, state.q.data(), j, J.data());
-    std::vector<double> got(6), want;
-    for (size_t r = 0; r < 6; ++r)
-      for (size_t k = 0; k < nv; ++k) got[r] += J[r * nv + k] * state.v[k];
-    const Pose<double>& at = motions.pose[model.joints[j].link];
-    const Screw<double>& v = motions.velocity[model.joints[j].link];
-    for (const Vec3<double>& part :
-         {transpose_times(at.R, v.s + cross(v.w, at.p)), transpose_times(at.R, v.w)})
-      want.insert(want.end(), {part.x, part.y, part.z});
-    expect_close(got, want, 1e-13, "velocity of " + model.joints[j].name);
+  for (size_t l = 0; l < model.links.size(); ++l) {
+    const Frame frame{model.links[l].name, {random_rotation(draws), random_vector3(draws)}};
+    const FramePlacement at = place_frame(model, frame);
+    const Pose<double>& link = motions.pose[l];
+    const Vec3<double> point = link.p + link.R * frame.placement.r;
+    const Mat3<double> R = link.R * transpose(frame.placement.R);  // frame -> world
+    const Motion<double> world = velocity_at(motions.velocity[l], point);
+    const Motion<double> own{transpose_times(R, world.lin), transpose_times(R, world.ang)};
+    for (const bool world_axes : {false, true}) {
+      frame_jacobian(model, state.q.data(), at, world_axes, J.data());
+      std::vector<double> got(6);
+      for (size_t r = 0; r < 6; ++r)
+        for (size_t k = 0; k < nv; ++k) got[r] += J[r * nv + k] * state.v[k];
+      expect_close(got, numbers(world_axes ? world : own), tolerance,
+                   "velocity by J, " + frame.link);
+    }
+    const FrameMotion found = frame_motion(model, state.q.data(), state.v.data(), nullptr, at);
+    expect_close(numbers(found.velocity), numbers(own), tolerance, "velocity of " + frame.link);
+    const Mat3<double>& turned = found.pose.R;
+    for (int i = 0; i < 9; ++i) EXPECT_NEAR(turned.m[i], transpose(R).m[i], tolerance);
+    expect_close({found.pose.r.x, found.pose.r.y, found.pose.r.z}, {point.x, point.y, point.z},
+                 tolerance, "origin on " + frame.link);
   }
 }
 

@@ -197,7 +197,7 @@ UNITS = "known units: rad, deg, rev, m, cm, mm, km, s, ms, min, h, "
         (
             "\n[wrench.upper]\nzzz = 1",
             ": wrench.upper.zzz: unknown key; "
-            "the keys are: table, column, columns, interpolation, force, moment, frame",
+            "the keys are: table, column, columns, interpolation, link, point, axes, force, ...",
         ),
         (
             "\n[initial]\nposition.shouldr = 1",
@@ -210,7 +210,8 @@ UNITS = "known units: rad, deg, rev, m, cm, mm, km, s, ms, min, h, "
         ),
         (
             "\n[wrench.hand]\nforce = [0, 0, 1]",
-            ": wrench.hand: the model has no such body; the bodies are: upper, lower",
+            ": wrench.hand: is no link of the model and names none; "
+            "add link = ..., or the links are: base, upper, lower",
         ),
         (
             "\n[output]\njoints = ['slid']",

@@ -218,7 +218,7 @@ def test_single_options_may_be_keywords(chain):
         ({"drives": {"joint_9": 1.0}}, "joint_9"),
         ({"drives": {"joint_1": np.nan}}, r"drives\['joint_1'\]: .*not finite"),
         ({"drives": {"joint_1": [1.0, 2.0]}}, "joint_1"),
-        ({"wrenches": {"link_9": [0] * 6}}, "wrenches: unknown body 'link_9'"),
+        ({"wrenches": {"link_9": [0] * 6}}, r"wrenches\['link_9'\]: link 'link_9' does not exist"),
         ({"wrenches": {"link_1": [0] * 5}}, r"wrenches\['link_1'\]: .*six"),
         ({"numerics": {"integrator": "adam"}}, "adam"),
         ({"numerics": {"method": "magic"}}, "magic"),
