@@ -49,6 +49,17 @@ ModelSpec from_bytes(const nb::bytes& description) {
   return spec;
 }
 
+/// Fixed joints that are no joints of the model, because their links are merged.
+nb::list welds(const PyModel& self) {
+  const std::vector<JointSpec>& joints = self.model->spec().joints;
+  std::vector<char> merged(joints.size() + 1, 1);
+  for (const JointInfo& joint : self.model->joints) merged[joint.spec] = 0;
+  nb::list out;
+  for (size_t j = 0; j < joints.size(); ++j)
+    if (merged[j]) out.append(nb::make_tuple(joints[j].name, joints[j].parent, joints[j].child));
+  return out;
+}
+
 using ModelClass = nb::class_<PyModel>;
 
 /// The same machine with a body welded to one of its links.
@@ -244,6 +255,17 @@ void bind_joints(ModelClass& c) {
                                   [&](const JointInfo& j) { return s.model->links[j.link].name; });
           },
           "Name of the link that each joint moves, its child, in the order of joint_names.")
+      .def_prop_ro(
+          "parent_link_names",
+          [](const PyModel& s) {
+            nb::list out;
+            for (int j = 0; j < s.model->n_joints(); ++j) out.append(s.model->joint_spec(j).parent);
+            return out;
+          },
+          "Name of the link that each joint hangs on, its parent, in the order of joint_names; "
+          "empty for a floating base.")
+      .def_prop_ro("welds", &welds,
+                   "Fixed joints whose links are merged, as (joint, parent link, child link).")
       .def_prop_ro(
           "child_link_masses",
           [](const PyModel& s) {

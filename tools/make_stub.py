@@ -73,6 +73,8 @@ RETURNS = {
     "Model.joint_parents": "list[int]",
     "Model.joint_types": "list[str]",
     "Model.link_names": "list[str]",
+    "Model.parent_link_names": "list[str]",
+    "Model.welds": "list[tuple[str, str, str]]",
     "Simulation.advance": "dict[str, Any]",
     "Simulation.trace": "dict[str, Any]",
     "forward_dynamics": "Any",

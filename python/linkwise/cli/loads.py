@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from linkwise.cli.output import JsonOption, console, number, print_json, say_warnings, table, text
+from linkwise.cli.loads_at import AtOption, PointOption, show_at
+from linkwise.cli.output import (
+    JsonOption,
+    console,
+    number,
+    print_json,
+    say_warnings,
+    table,
+    text,
+    write_csv,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,6 +37,8 @@ def loads(
         list[str] | None,
         typer.Option("--joint", "-j", help="Only this joint, in full; may be repeated."),
     ] = None,
+    at: AtOption = None,
+    point: PointOption = None,
     split: Annotated[
         str | None,
         typer.Option(
@@ -59,6 +71,7 @@ def loads(
     as_json: JsonOption = False,
 ) -> None:
     """Peak loads of every joint of a RUN: with bounds, by cause, against ratings."""
+    from linkwise._core import InputError
     from linkwise.io.writing import check_file
     from linkwise.loads.samples import joint_position
     from linkwise.results import open_run
@@ -67,9 +80,18 @@ def loads(
         if written is not None:
             check_file(written)
     opened = open_run(run)
-    for name in joint or ():
-        joint_position(opened, name)
+    if at is not None or point is not None:
+        if any((split, ratings, certify, html)) or at is None:
+            raise InputError("--at: goes with --point, --joint, --csv, --model and --json alone")
+        show_at(opened, machine_of(opened, model), at, point, joint, csv, as_json)
+        return
     machine = machine_of(opened, model)
+    for name in joint or ():
+        if any(name == weld for weld, _, _ in machine.welds):
+            raise InputError(
+                f"joint {name!r}: is fixed and its links are merged; add --at child for its load"
+            )
+        joint_position(opened, name)
     found = collect(opened, machine, rating_tables(opened, ratings), certify, as_json)
     shares = peak_shares(opened, machine, found["summary"], split) if split else []
     records = peak_records(found, joint)
@@ -194,21 +216,6 @@ def peak_records(found: dict[str, Any], joints: list[str] | None) -> list[dict[s
             record: dict[str, Any] = {"joint": name, "quantity": quantity, "unit": units[k]}
             records.append(record | {key: float(values[k, j]) for key, values in columns.items()})
     return records
-
-
-def write_csv(records: list[dict[str, Any]], path: Path) -> None:
-    import csv
-
-    from linkwise._core import InputError
-    from linkwise.io.writing import csv_cell, written_whole
-
-    if not records:
-        raise InputError(f"{str(path)!r}: there is nothing to write")
-    with written_whole(path) as aside, open(aside, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, records[0], lineterminator="\n")
-        writer.writeheader()
-        for record in records:
-            writer.writerow({k: "" if v != v else csv_cell(v) for k, v in record.items()})
 
 
 def peak_shares(run: Run, model: Model, summary: xr.Dataset, by: str) -> list[dict[str, Any]]:

@@ -138,3 +138,19 @@ def peak_table(records: Sequence[Mapping[str, Any]], limit: int = 40) -> Table:
             number(record["moment_time"]),
         )
     return made
+
+
+def write_csv(records: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Records with the same keys as a table with a head."""
+    import csv
+
+    from linkwise._core import InputError
+    from linkwise.io.writing import csv_cell, written_whole
+
+    if not records:
+        raise InputError(f"{str(path)!r}: there is nothing to write")
+    with written_whole(path) as aside, open(aside, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, records[0], lineterminator="\n")
+        writer.writeheader()
+        for record in records:
+            writer.writerow({k: "" if v != v else csv_cell(v) for k, v in record.items()})

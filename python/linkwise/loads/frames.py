@@ -1,16 +1,19 @@
-"""Joint loads in other axes and about other points."""
+"""Loads of joints, merged ones too, in other axes and about other points."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, NamedTuple, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from linkwise import _core
-from linkwise._core import InputError, as_floats
+from linkwise._core import Frame, InputError, as_floats
 from linkwise.base import Array
-from linkwise.loads.samples import joint_names, model_of, need_whole, rows
+from linkwise.io.complaint import near
+from linkwise.loads.samples import model_of, need_whole, rows
+from linkwise.loads.welds import Weld
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
     from linkwise._core import Model
     from linkwise.loads.samples import RunLike
 
-Frame = Literal["child", "parent", "world"]
+FixedIn = Literal["child", "parent", "world"]
 _AXES = {
     "child": "joint frame, fixed in the outboard body",
     "parent": "frame of the inboard body: its own joint's; at the ground the world's",
@@ -26,13 +29,13 @@ _AXES = {
 }
 
 
-def _frames(model: Model, q: Array) -> tuple[Array, Array]:
-    """Poses (time, joint, 4, 4) of the joints' frames and of their inboard bodies' frames."""
-    child = _core.joint_poses(model, q)
-    inboard = np.asarray(model.joint_parents)
-    parent = child[:, np.maximum(inboard, 0)]
-    parent[:, inboard < 0] = np.eye(4)
-    return child, parent
+class _Loads(NamedTuple):
+    """Loads (..., joint, 6) of some joints, each at and in its own frame; poses (..., joint, 4, 4)
+    of these frames and of the inboard bodies' frames."""
+
+    load: Array
+    child: Array
+    parent: Array
 
 
 def _turned(load: Array, rotation: Array) -> Array:
@@ -49,65 +52,216 @@ def move_wrench(load: Array, origin: Array, point: Array) -> Array:
     return moved
 
 
+def _inboard(model: Model, child: Array, body: str | None) -> Array:
+    """Poses (..., 4, 4) of a body's frame, by its link's name; of the world's for None."""
+    if body is None:
+        return np.broadcast_to(np.eye(4), (*child.shape[:-3], 4, 4))
+    return child[..., model.child_link_names.index(body), :, :]
+
+
+def _of_joints(model: Model, q: Array, load: Array) -> _Loads:
+    """All joints of the model; load (..., joint, 6)."""
+    child = _core.joint_poses(model, q)
+    inboard = np.asarray(model.joint_parents, dtype=np.intp)
+    parent = child[..., np.maximum(inboard, 0), :, :]
+    parent[..., inboard < 0, :, :] = np.eye(4)
+    return _Loads(load, child, parent)
+
+
+def _of_run(run: RunLike, model: Model, names: Sequence[str]) -> _Loads:
+    """The named joints of a run, merged ones too."""
+    everything = slice(None)
+    q = rows(run, "position", everything)
+    whole = _of_joints(model, q, rows(run, "joint_load", everything))
+    index = {name: k for k, name in enumerate(model.joint_names)}
+    if list(names) == list(index):
+        return whole
+    welds = {name for name, _, _ in model.welds}
+    found = []
+    for name in names:
+        if name in welds:
+            weld = Weld(model, name)
+            load = weld.load(run, whole.child, everything)
+            parent = _inboard(model, whole.child, model.frame_placement(weld.parent)[0])
+            found.append(_Loads(load, _core.frame_pose(model, q, weld.child), parent))
+        else:
+            k = model.joint_index(name)
+            found.append(_Loads(*(part[:, k] for part in whole)))
+    return _Loads(*(np.stack(parts, axis=1) for parts in zip(*found, strict=True)))
+
+
+def _of_array(
+    loads: npt.ArrayLike, model: Model, q: npt.ArrayLike, names: Sequence[str]
+) -> tuple[Array, _Loads]:
+    """q, and the named joints of loads (..., n_joints, 6)."""
+    load, state = as_floats(loads, "loads"), as_floats(q, "q")
+    if load.shape[-2:] != (model.n_joints, 6) or load.ndim < 2:
+        raise InputError(
+            f"loads: shape {load.shape}; give (..., {model.n_joints}, 6), the loads of all joints"
+        )
+    welds = {name for name, _, _ in model.welds}
+    for name in names:
+        if name in welds:
+            raise InputError(
+                f"joint {name!r} is fixed and its links are merged, so loads in an array do not "
+                "tell its own; give a run, or load the model with keep_fixed"
+            )
+    take = [model.joint_index(name) for name in names]
+    found = _of_joints(model, state, load)
+    return state, _Loads(*(part.take(take, axis=-3 if k else -2) for k, part in enumerate(found)))
+
+
+def _in_frame(
+    model: Model, q: Array, found: _Loads, frame: str | Frame, point: Array | None, fixed_in: str
+) -> tuple[Array, dict[str, str]]:
+    """Loads (..., joint, 6) in the axes of a frame and about a point, and what these are."""
+    world = _turned(found.load, found.child[..., :3, :3])
+    poses = {"child": found.child, "parent": found.parent, "world": np.eye(4)}
+    where = "joint point: the origin of the joint frame"
+    at = None
+    if isinstance(frame, str) and frame in _AXES:
+        axes, shown = poses[frame], _AXES[frame]
+    else:
+        axes = _core.frame_pose(model, q, frame)[..., None, :, :]
+        shown = f"frame of link {frame!r}" if isinstance(frame, str) else repr(frame)
+        at, where = axes[..., :3, 3], "the frame's origin"
+    if point is not None:
+        pose = poses[fixed_in]
+        at = pose[..., :3, 3] + np.einsum(
+            "...ik,...k->...i",
+            pose[..., :3, :3],
+            np.broadcast_to(point, (found.load.shape[-2], 3)),
+        )
+        told = "(" + ", ".join(f"{x:g}" for x in point) + ") m" if point.ndim == 1 else ""
+        where = f"{told or 'given per joint'} in the {_AXES[fixed_in]}"
+    if at is not None:
+        world = move_wrench(world, found.child[..., :3, 3], at)
+    moved = _turned(world, np.swapaxes(axes[..., :3, :3], -1, -2))
+    return moved, {"frame": shown, "point": where}
+
+
+def _checked(model: Model, frame: str | Frame, fixed_in: str) -> None:
+    if fixed_in not in _AXES:
+        raise InputError(f"fixed_in: {fixed_in!r} is unknown; use {', '.join(_AXES)}")
+    if isinstance(frame, str) and frame not in _AXES and frame not in model.link_names:
+        known = near(frame, model.link_names, "the links are")
+        raise InputError(
+            f"frame: {frame!r} is unknown; use {', '.join(_AXES)}, a Frame or a link ({known})"
+        )
+
+
+def _as_point(point: npt.ArrayLike | None, joints: int) -> Array | None:
+    if point is None:
+        return None
+    given = as_floats(point, "point")
+    if given.shape not in ((3,), (joints, 3)) or not np.isfinite(given).all():
+        raise InputError(
+            f"point: shape {given.shape}; give three finite coordinates in metres, or one row "
+            f"per joint ({joints}, 3)"
+        )
+    return given
+
+
+@overload
 def in_frame(
     run: RunLike,
-    frame: Frame = "world",
+    frame: str | Frame = ...,
     *,
+    joint: str | Sequence[str] | None = ...,
+    point: npt.ArrayLike | None = ...,
+    fixed_in: FixedIn = ...,
+    model: Model | None = ...,
+) -> xr.DataArray: ...
+@overload
+def in_frame(
+    run: npt.ArrayLike,
+    frame: str | Frame = ...,
+    *,
+    joint: str | Sequence[str] | None = ...,
+    point: npt.ArrayLike | None = ...,
+    fixed_in: FixedIn = ...,
+    model: Model,
+    q: npt.ArrayLike,
+) -> Array: ...
+def in_frame(
+    run: RunLike | npt.ArrayLike,
+    frame: str | Frame = "world",
+    *,
+    joint: str | Sequence[str] | None = None,
     point: npt.ArrayLike | None = None,
-    fixed_in: Frame = "child",
+    fixed_in: FixedIn = "child",
     model: Model | None = None,
-) -> xr.DataArray:
-    """Joint loads in the axes of another frame, about any point of either body.
+    q: npt.ArrayLike | None = None,
+) -> xr.DataArray | Array:
+    """Joint loads in the axes of another frame, about any point.
+
+    A fixed joint whose links are merged has a load too, what moves everything beyond it: the
+    reading of a force-torque sensor there, wherever it is on a link.
 
     Args:
-        run: Holds `joint_load` and `position` of all joints.
-        frame: Axes of the components: "child" (the joint frame), "parent" or "world".
-        point: Where moments are taken about, as coordinates (3,) or (joint, 3) [m] in the frame
-            `fixed_in`; the joint point by default.
-        fixed_in: The frame that the point is fixed in.
-        model: The machine, if the run does not hold it.
+        run: A run that holds `joint_load` and `position` of all joints, for fixed joints also
+            `velocity` and `acceleration`; or an array (..., n_joints, 6) as `joint_loads` returns
+            it.
+        frame: Axes of the components: "child" (the joint frame), "parent", "world", the name of
+            any link, or a `Frame`. Moments are taken about the joint point, in the frame of a link
+            about its origin.
+        joint: The joint, or several, by name; all of them by default.
+        point: Where moments are taken about instead, as coordinates (3,) or (joint, 3) [m] in the
+            frame `fixed_in`.
+        fixed_in: The frame that the point is fixed in: "child", "parent" or "world".
+        model: The machine, if the run does not hold it; an array needs it.
+        q: Positions (..., nq) [rad, m] of loads in an array.
 
     Returns:
-        DataArray (time, joint, component); `attrs` state frame, point and convention.
+        DataArray (time, joint, component), without joint for a single one; `attrs` state frame,
+        point and convention. Of an array an array (..., joint, 6), or (..., 6).
+
+    Raises:
+        InputError: the frame or joint is unknown, shapes are wrong, the run lacks a quantity, or
+            wrenches act on both sides of a merged joint.
     """
-    for name in (frame, fixed_in):
-        if name not in _AXES:
-            raise InputError(f"frame: {name!r} is unknown; use {', '.join(_AXES)}")
+    if not hasattr(run, "dataset"):
+        if model is None or q is None:
+            raise InputError("loads in an array need their machine and state; give model and q")
+        names = list(model.joint_names) if joint is None else _names(joint)
+        _checked(model, frame, fixed_in)
+        state, found = _of_array(run, model, q, names)
+        at = _as_point(point, len(names))
+        moved, _ = _in_frame(model, state, found, frame, at, fixed_in)
+        return moved[..., 0, :] if isinstance(joint, str) else moved
+    return _run_in_frame(cast("RunLike", run), frame, joint, point, fixed_in, model)
+
+
+def _run_in_frame(
+    run: RunLike,
+    frame: str | Frame,
+    joint: str | Sequence[str] | None,
+    point: npt.ArrayLike | None,
+    fixed_in: FixedIn,
+    model: Model | None,
+) -> xr.DataArray:
     machine = model_of(run, model)
     need_whole(run, machine, "joint_load", "position")
+    _checked(machine, frame, fixed_in)
+    names = list(machine.joint_names) if joint is None else _names(joint)
+    at = _as_point(point, len(names))
+    found = _of_run(run, machine, names)
     q = rows(run, "position", slice(None))
-    load = rows(run, "joint_load", slice(None))
-    child, parent = _frames(machine, q)
-    where = "joint point: the origin of the joint frame"
-    world = _turned(load, child[..., :3, :3])
-    if point is not None:
-        given = as_floats(point, "point")
-        if given.shape not in ((3,), (machine.n_joints, 3)) or not np.isfinite(given).all():
-            raise InputError(
-                f"point: shape {given.shape}; give three finite coordinates in metres, or one row "
-                f"per joint ({machine.n_joints}, 3)"
-            )
-        pose = {"child": child, "parent": parent}.get(fixed_in, np.eye(4))
-        at = pose[..., :3, 3] + np.einsum(
-            "...ik,...k->...i", pose[..., :3, :3], np.broadcast_to(given, (machine.n_joints, 3))
-        )
-        world = move_wrench(world, child[..., :3, 3], at)
-        shown = (
-            "given per joint"
-            if given.ndim == 2
-            else "(" + ", ".join(f"{x:g}" for x in given) + ") m"
-        )
-        where = f"{shown} in the {_AXES[fixed_in]}"
-    if frame == "child":
-        load = _turned(world, np.swapaxes(child[..., :3, :3], -1, -2))
-    elif frame == "parent":
-        load = _turned(world, np.swapaxes(parent[..., :3, :3], -1, -2))
-    else:
-        load = world
-    return _labelled(run, load, {"frame": _AXES[frame], "point": where})
+    moved, attrs = _in_frame(machine, q, found, frame, at, fixed_in)
+    made = _labelled(run, names, moved, attrs)
+    return made.isel(joint=0) if isinstance(joint, str) else made
 
 
-def _labelled(run: RunLike, load: Array, attrs: dict[str, str]) -> xr.DataArray:
+def _names(joint: str | Sequence[str]) -> list[str]:
+    names = [joint] if isinstance(joint, str) else list(joint)
+    if not names:
+        raise InputError("joint: no name is given; leave it out for all joints")
+    return names
+
+
+def _labelled(
+    run: RunLike, names: Sequence[str], load: Array, attrs: dict[str, str]
+) -> xr.DataArray:
     import xarray as xr
 
     given = run.dataset["joint_load"]
@@ -116,7 +270,7 @@ def _labelled(run: RunLike, load: Array, attrs: dict[str, str]) -> xr.DataArray:
         dims=("time", "joint", "component"),
         coords={
             "time": run.dataset["time"],
-            "joint": ("joint", joint_names(run)),
+            "joint": ("joint", list(names)),
             "component": given["component"],
         },
         attrs={**given.attrs, **attrs},

@@ -228,3 +228,54 @@ def test_wrong_sweeps(linkwise, scene, axis, complaint):
     result = linkwise("sweep", scene, "-s", axis, "--processes", "1")
     assert result.code == 2
     assert complaint in result.complaint
+
+
+@pytest.fixture
+def wrist(linkwise, tmp_path):
+    """A run of an arm that holds 1 kg with 0.07 m to the side of a force sensor without mass."""
+    (tmp_path / "wrist.urdf").write_text(
+        """<robot name="wrist"><link name="arm"/><link name="sensor"/>
+        <link name="hand"><inertial><origin xyz="0.07 0 0"/><mass value="1"/>
+          <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+        <link name="tip"/>
+        <joint name="wrist" type="continuous"><parent link="arm"/><child link="sensor"/></joint>
+        <joint name="flange" type="fixed"><parent link="sensor"/><child link="hand"/></joint>
+        <joint name="end" type="fixed"><origin xyz="0.07 0 0.5"/><parent link="hand"/>
+          <child link="tip"/></joint></robot>"""
+    )
+    (tmp_path / "hold.toml").write_text(
+        'model = "wrist.urdf"\ndrive.wrist.kind = "locked"\nsimulate.duration = 0.1\n'
+    )
+    assert linkwise("run", "hold.toml", "-o", "hold.zarr").code == 0
+    return "hold.zarr"
+
+
+def test_loads_at_a_link_of_joints_that_are_merged(linkwise, wrist, tmp_path):
+    told = linkwise("loads", wrist, "--at", "child", "-j", "flange", "--json").json
+    peaks = {row["quantity"]: row["peak"] for row in told["loads"]}
+    assert peaks["fz"] == pytest.approx(9.81)
+    assert peaks["ny"] == pytest.approx(-0.07 * 9.81)
+    shown = linkwise("loads", wrist, "--at", "tip", "--csv", "tip.csv")
+    assert "about the frame's origin" in " ".join(shown.out.split())
+    rows = list(csv.DictReader((tmp_path / "tip.csv").open()))
+    assert [row["joint"] for row in rows] == ["wrist"] * 8
+    assert abs(float(rows[6]["peak"])) < 1e-12
+    told = linkwise("loads", wrist, "--at", "tip", "--point", "1", "0", "0", "--json").json
+    peaks = {row["quantity"]: row["peak"] for row in told["loads"]}
+    assert peaks["ny"] == pytest.approx(9.81)
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (["-j", "flange"], "joint 'flange': is fixed and its links are merged; add --at child"),
+        (["--at", "tp"], "did you mean 'tip'?"),
+        (["--at", "tip", "--split", "force"], "--at: goes with --point"),
+        (["--point", "1", "0", "0"], "--at: goes with --point"),
+        (["--at", "world", "--point", "1", "0", "0"], "link 'world' does not exist"),
+    ],
+)
+def test_what_is_no_frame_is_named(linkwise, wrist, options, complaint):
+    result = linkwise("loads", wrist, *options)
+    assert result.code == 2
+    assert complaint in result.err

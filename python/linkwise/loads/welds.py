@@ -1,0 +1,142 @@
+"""What passes through fixed joints whose links are merged, such as the flange of a force sensor.
+
+A merged joint is no joint of the equations of motion, but it carries a load all the same: what
+moves the links beyond it, on its outboard side. With their mass m, centre c, inertia I about the
+origin of the joint's child link, and that frame's own acceleration a, turning w and gravity g,
+
+    f = m (a - g + w' x c + w x (w x c)),    n = m c x (a - g) + I w' + w x I w,
+
+plus the loads of the joints that hang on them, less the wrenches that act on them from outside.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from linkwise import _core
+from linkwise._core import InputError
+from linkwise.base import Array
+from linkwise.loads.samples import external, need, rows
+
+if TYPE_CHECKING:
+    from linkwise._core import Model
+    from linkwise.loads.samples import RunLike
+
+
+class Weld:
+    """A merged joint of a model: the links on both sides, and what is beyond it."""
+
+    def __init__(self, model: Model, joint: str) -> None:
+        self.model, self.joint = model, joint
+        outboard: dict[str, list[str]] = {}
+        for name, parent, child in model.welds:
+            outboard.setdefault(parent, []).append(child)
+            if name == joint:
+                self.parent, self.child = parent, child
+        self.beyond = [self.child]
+        for link in self.beyond:  # grows while it is walked
+            self.beyond += outboard.get(link, [])
+        links = set(self.beyond)
+        self.outboard_joints = [
+            k for k, parent in enumerate(model.parent_link_names) if parent in links
+        ]
+        self.body, self._axes, self._origin = model.frame_placement(self.child)
+
+    def load(self, run: RunLike, child: Array, where: slice | Sequence[int]) -> Array:
+        """Loads (time, 6) at the child link's origin in its axes, positive on what is beyond.
+
+        child: poses (time, joint, 4, 4) of the model's joint frames at these samples.
+        """
+        q = rows(run, "position", where)
+        pose = _core.frame_pose(self.model, q, self.child)
+        load = self._of_masses(run, q, pose, where)
+        outboard = rows(run, "joint_load", where)
+        for k in self.outboard_joints:
+            load += carried_to(pose, outboard[:, k], child[:, k])
+        return load - self._external(run, where)
+
+    def _of_masses(
+        self, run: RunLike, q: Array, pose: Array, where: slice | Sequence[int]
+    ) -> Array:
+        mass, center, inertia = self._inertia()
+        weight = np.einsum("tki,k->ti", pose[:, :3, :3], self.model.gravity)
+        if self.body is None:
+            a = alpha = w = np.zeros_like(weight)
+        else:
+            need(run, "velocity", "acceleration")
+            v, du = rows(run, "velocity", where), rows(run, "acceleration", where)
+            w = _core.frame_velocity(self.model, q, v, self.child, axes="frame")[:, 3:]
+            both = _core.frame_acceleration(self.model, q, v, du, self.child, axes="frame")
+            a, alpha = both[:, :3], both[:, 3:]
+        felt = a - weight
+        force = mass * (felt + np.cross(alpha, center) + np.cross(w, np.cross(w, center)))
+        moment = mass * np.cross(center, felt) + alpha @ inertia + np.cross(w, w @ inertia)
+        return np.concatenate([force, moment], axis=1)
+
+    def _inertia(self) -> tuple[float, Array, Array]:
+        """Mass, centre and inertia about the child link's origin, in its axes, of what is beyond.
+
+        Moving links that hang there have joints of their own and are not in it.
+        """
+        model, total = self.model, 0.0
+        first, second = np.zeros(3), np.zeros((3, 3))
+        index = {name: k for k, name in enumerate(model.link_names)}
+        masses, centers, inertias = (
+            model.link_masses,
+            model.link_centers_of_mass,
+            model.link_inertias,
+        )
+        for link in self.beyond:
+            k = index[link]
+            _, axes, origin = model.frame_placement(link)
+            turn = self._axes.T @ axes
+            center = turn @ centers[k] + self._axes.T @ (origin - self._origin)
+            total += masses[k]
+            first += masses[k] * center
+            about = np.eye(3) * (center @ center) - np.outer(center, center)
+            second += turn @ inertias[k] @ turn.T + masses[k] * about
+        return total, first / total if total > 0 else first, second
+
+    def _external(self, run: RunLike, where: slice | Sequence[int]) -> Array:
+        """The wrenches (time, 6) on what is beyond; the run holds their sum on the whole body."""
+        on_body = [
+            link
+            for link in wrenched_links(run)
+            if self.model.frame_placement(link)[0] == self.body and self.body is not None
+        ]
+        beyond = [link for link in on_body if link in self.beyond]
+        if not beyond:
+            return np.zeros(6)
+        if len(beyond) < len(on_body):
+            before = next(link for link in on_body if link not in self.beyond)
+            raise InputError(
+                f"joint {self.joint!r} is fixed and its links are merged, wrenches act on both "
+                f"sides of it ({before!r} and {beyond[0]!r}), and the run holds their sum; load "
+                "with keep_fixed to have its load"
+            )
+        whole = external(run, self.model, where)
+        if whole is None:
+            return np.zeros(6)
+        given = whole[:, self.model.child_link_names.index(str(self.body))]
+        force = given[:, :3] @ self._axes
+        moment = (given[:, 3:] - np.cross(self._origin, given[:, :3])) @ self._axes
+        return np.concatenate([force, moment], axis=1)
+
+
+def wrenched_links(run: RunLike) -> list[str]:
+    """The link that each external wrench of the run acts on."""
+    told = json.loads(run.dataset.attrs.get("wrenches", "{}"))
+    return [wrench.get("at", {}).get("link", name) for name, wrench in told.items()]
+
+
+def carried_to(pose: Array, load: Array, origin: Array) -> Array:
+    """Loads (time, 6) in frames `origin` (time, 4, 4), at and in the frames `pose`."""
+    turn = np.einsum("tki,tkj->tij", pose[:, :3, :3], origin[:, :3, :3])
+    arm = np.einsum("tki,tk->ti", pose[:, :3, :3], origin[:, :3, 3] - pose[:, :3, 3])
+    force = np.einsum("tij,tj->ti", turn, load[:, :3])
+    moment = np.einsum("tij,tj->ti", turn, load[:, 3:]) + np.cross(arm, force)
+    return np.concatenate([force, moment], axis=1)
