@@ -48,6 +48,7 @@ from linkwise.drives import Spring as Spring
 from linkwise.drives import Table as Table
 from linkwise.drives import Torque as Torque
 from linkwise.drives import Wrench as Wrench
+from linkwise.drives import external_wrenches as external_wrenches
 from linkwise.io.load import load as load
 from linkwise.notes import ModelWarning as ModelWarning
 from linkwise.results import Run as Run

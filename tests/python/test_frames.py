@@ -237,3 +237,38 @@ def test_what_a_scenario_gets_wrong(tmp_path, section, message):
     with pytest.raises(lw.InputError, match=message) as error:
         lw.run_scenario(path)
     assert "\n" not in str(error.value)
+
+
+def test_loads_of_a_state_under_a_wrench_at_the_tip(leg):
+    many = np.random.default_rng(3).normal(size=(5, 2))
+    still = np.zeros(2)
+    for push in (
+        {"foot_tip": UP},
+        {TIP: UP / 2, "half": lw.Wrench(UP / 2, at="foot_tip")},
+        {"foot_tip": np.tile(UP, (5, 1))},
+    ):
+        outside = lw.external_wrenches(leg, many, push)
+        assert outside.shape == (5, 2, 6)
+        torque = lw.inverse_dynamics(leg, many, still, still, external=outside)
+        J = lw.frame_jacobian(leg, many, "foot_tip")
+        free = lw.inverse_dynamics(leg, many, still, still)
+        np.testing.assert_allclose(torque, free - np.swapaxes(J, -1, -2) @ UP, atol=1e-12)
+    run = hold(leg, {TIP: lw.Wrench(UP, "body")})
+    outside = lw.external_wrenches(leg, POSE, {TIP: lw.Wrench(UP, "body")})
+    np.testing.assert_allclose(outside[1], run.external_wrench[0, 0], rtol=0, atol=1e-12)
+    loads = lw.inverse_dynamics_loads(leg, POSE, still, still, external=outside)
+    np.testing.assert_allclose(loads, run.joint_load[0], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("push", "message"),
+    [
+        ({"base": UP}, "is fixed to the ground"),
+        ({"shank": [1, 2]}, r"shape \(2,\)"),
+        ({"shank": lw.Wrench(lambda t: UP)}, "is no constant"),
+        ({"shonk": UP}, "did you mean 'shank'"),
+    ],
+)
+def test_wrenches_of_a_state_that_are_refused(leg, push, message):
+    with pytest.raises(lw.InputError, match=message):
+        lw.external_wrenches(leg, POSE, push)

@@ -15,6 +15,7 @@ from linkwise.drives.drive import (
     as_drive,
     as_wrench,
 )
+from linkwise.drives.external import external_wrenches
 
 __all__ = [
     "PD",
@@ -30,4 +31,5 @@ __all__ = [
     "WrenchAxes",
     "as_drive",
     "as_wrench",
+    "external_wrenches",
 ]

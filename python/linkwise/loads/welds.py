@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from linkwise import _core
-from linkwise._core import InputError
+from linkwise._core import Frame, InputError
 from linkwise.base import Array
 from linkwise.loads.samples import external, need, rows
 
@@ -57,7 +57,7 @@ class Weld:
         outboard = rows(run, "joint_load", where)
         for k in self.outboard_joints:
             load += carried_to(pose, outboard[:, k], child[:, k])
-        return load - self._external(run, where)
+        return load - self._external(run, q, pose, where)
 
     def _of_masses(
         self, run: RunLike, q: Array, pose: Array, where: slice | Sequence[int]
@@ -101,23 +101,41 @@ class Weld:
             second += turn @ inertias[k] @ turn.T + masses[k] * about
         return total, first / total if total > 0 else first, second
 
-    def _external(self, run: RunLike, where: slice | Sequence[int]) -> Array:
-        """The wrenches (time, 6) on what is beyond; the run holds their sum on the whole body."""
-        on_body = [
-            link
-            for link in wrenched_links(run)
-            if self.model.frame_placement(link)[0] == self.body and self.body is not None
-        ]
-        beyond = [link for link in on_body if link in self.beyond]
+    def _external(self, run: RunLike, q: Array, pose: Array, where: slice | Sequence[int]) -> Array:
+        """The wrenches (time, 6) on what is beyond. The run holds their sum on the whole body, and
+        those that are constant."""
+        if self.body is None:
+            return np.zeros(6)
+        beyond: list[ToldWrench] = []
+        before: list[ToldWrench] = []
+        for wrench in told_wrenches(run):
+            if self.model.frame_placement(wrench.at)[0] == self.body:
+                (beyond if wrench.at.link in self.beyond else before).append(wrench)
         if not beyond:
             return np.zeros(6)
-        if len(beyond) < len(on_body):
-            before = next(link for link in on_body if link not in self.beyond)
+        if before and all(wrench.value is not None for wrench in beyond):
+            return self._sum(beyond, q, pose)
+        if any(wrench.value is None for wrench in before):
             raise InputError(
-                f"joint {self.joint!r} is fixed and its links are merged, wrenches act on both "
-                f"sides of it ({before!r} and {beyond[0]!r}), and the run holds their sum; load "
-                "with keep_fixed to have its load"
+                f"joint {self.joint!r} is fixed and its links are merged, wrenches change on both "
+                f"sides of it ({before[0].at.link!r} and {beyond[0].at.link!r}), and the run holds "
+                "their sum; simulate without those on one side, or load with keep_fixed"
             )
+        rest: Array = self._recorded(run, where) - self._sum(before, q, pose)
+        return rest
+
+    def _sum(self, wrenches: Sequence[ToldWrench], q: Array, pose: Array) -> Array:
+        """Constant wrenches, added up at the child link's origin in its axes."""
+        total = np.zeros((len(q), 6))
+        for wrench in wrenches:
+            at = _core.frame_pose(self.model, q, wrench.at)
+            if wrench.along_world:
+                at[:, :3, :3] = np.eye(3)
+            total += carried_to(pose, np.tile(np.asarray(wrench.value), (len(q), 1)), at)
+        return total
+
+    def _recorded(self, run: RunLike, where: slice | Sequence[int]) -> Array:
+        """The sum on the whole body, at the child link's origin in its axes."""
         whole = external(run, self.model, where)
         if whole is None:
             return np.zeros(6)
@@ -127,10 +145,22 @@ class Weld:
         return np.concatenate([force, moment], axis=1)
 
 
-def wrenched_links(run: RunLike) -> list[str]:
-    """The link that each external wrench of the run acts on."""
-    told = json.loads(run.dataset.attrs.get("wrenches", "{}"))
-    return [wrench.get("at", {}).get("link", name) for name, wrench in told.items()]
+class ToldWrench(NamedTuple):
+    """An external wrench as the attributes of a run tell it; value: None unless constant."""
+
+    at: Frame
+    along_world: bool
+    value: list[float] | None
+
+
+def told_wrenches(run: RunLike) -> list[ToldWrench]:
+    found = []
+    for name, told in json.loads(run.dataset.attrs.get("wrenches", "{}")).items():
+        at = told.get("at", {"link": name})  # before frames a name was that of a link
+        value = told.get("value")
+        constant = value if isinstance(value, list) else None
+        found.append(ToldWrench(Frame(**at), told.get("frame") == "world", constant))
+    return found
 
 
 def carried_to(pose: Array, load: Array, origin: Array) -> Array:
