@@ -11,6 +11,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 
+#include "gil.hpp"
 #include "linkwise/base/error.hpp"
 #include "linkwise/base/memory.hpp"
 
@@ -77,7 +78,10 @@ inline nb::tuple to_tuple(const Shape& shape) {
   return lengths;
 }
 
-inline nb::object numpy(const char* name) { return nb::module_::import_("numpy").attr(name); }
+inline PythonFunction python_function(const char* module, const char* name) {
+  return PythonFunction(nb::module_::import_(module).attr(name));
+}
+inline PythonFunction numpy(const char* name) { return python_function("numpy", name); }
 
 /// How NumPy's arrays and their dtypes begin, in all its versions. Reading it takes some
 /// nanoseconds; the buffer protocol takes 150, as much as the dynamics of two bodies.
@@ -97,29 +101,37 @@ struct NumpyArray {
 
 inline constexpr int numpy_float64 = 12;
 
-inline PyTypeObject* numpy_array_type() {
-  // Kept for the life of the process: looking it up costs more than the rest.
-  static const nb::handle type = numpy("ndarray").release();
-  return reinterpret_cast<PyTypeObject*>(type.ptr());
+/// What compiled code needs of NumPy. Looking it up costs more than the dynamics of a small
+/// machine.
+struct NumpyTable {
+  PyTypeObject* array_type;
+  PyObject* (*new_array)(PyTypeObject*, int, const Py_ssize_t*, int, const Py_ssize_t*, void*, int,
+                         int, PyObject*);  ///< PyArray_New: a third of the time of numpy.empty
+};
+inline NumpyTable numpy_table{};
+
+/// Once, by the import of the module: in the middle of calls, two threads could wait for each
+/// other, one for this and one for the GIL.
+inline void find_numpy() {
+  const nb::module_ module = nb::module_::import_("numpy");
+  const bool old = nb::cast<std::string>(module.attr("__version__")).starts_with("1.");
+  const nb::object functions =
+      nb::module_::import_(old ? "numpy.core._multiarray_umath" : "numpy._core._multiarray_umath")
+          .attr("_ARRAY_API");
+  const auto* table = static_cast<void**>(PyCapsule_GetPointer(functions.ptr(), nullptr));
+  if (!table) throw nb::python_error();
+  numpy_table.new_array = reinterpret_cast<decltype(numpy_table.new_array)>(table[93]);
+  // Kept for the life of the process.
+  numpy_table.array_type =
+      reinterpret_cast<PyTypeObject*>(nb::object(module.attr("ndarray")).release().ptr());
 }
 
-/// A new array of float64 by NumPy's own function for compiled code, PyArray_New: a third of the
-/// time of numpy.empty.
+/// A new array of float64.
 inline PyObject* make_numpy(const Shape& shape) {
-  using New = PyObject* (*)(PyTypeObject*, int, const Py_ssize_t*, int, const Py_ssize_t*, void*,
-                            int, int, PyObject*);
-  static const New make = [] {
-    const bool old = nb::cast<std::string>(numpy("__version__")).starts_with("1.");
-    const nb::object table =
-        nb::module_::import_(old ? "numpy.core._multiarray_umath" : "numpy._core._multiarray_umath")
-            .attr("_ARRAY_API");
-    return reinterpret_cast<New>(
-        static_cast<void**>(PyCapsule_GetPointer(table.ptr(), nullptr))[93]);
-  }();
   Py_ssize_t lengths[Shape::max_axes];
   std::copy(shape.begin(), shape.end(), lengths);
-  PyObject* made = make(numpy_array_type(), static_cast<int>(shape.size()), lengths, numpy_float64,
-                        nullptr, nullptr, 0, 0, nullptr);
+  PyObject* made = numpy_table.new_array(numpy_table.array_type, static_cast<int>(shape.size()),
+                                         lengths, numpy_float64, nullptr, nullptr, 0, 0, nullptr);
   if (!made) throw nb::python_error();
   return made;
 }
@@ -132,7 +144,7 @@ class ArrayIn {
 
   /// False for anything else, kinds of arrays that may hide something (masks) included.
   bool open(nb::handle value) {
-    if (Py_TYPE(value.ptr()) != numpy_array_type()) return false;
+    if (Py_TYPE(value.ptr()) != numpy_table.array_type) return false;
     constexpr int contiguous = 0x1, aligned = 0x100;
     constexpr char foreign = std::endian::native == std::endian::little ? '>' : '<';
     const auto* found = reinterpret_cast<const NumpyArray*>(value.ptr());
@@ -191,12 +203,12 @@ inline ArrayIn as_array(nb::handle value, const char* name) {
   const char* found = nullptr;
   try {
     const nb::object given = numpy("asarray")(value);
-    if (PyObject_TypeCheck(value.ptr(), numpy_array_type()) &&
-        nb::cast<bool>(numpy("ma").attr("is_masked")(value)))
+    if (PyObject_TypeCheck(value.ptr(), numpy_table.array_type) &&
+        nb::cast<bool>(python_function("numpy.ma", "is_masked")(value)))
       found = "masked values";
     else
       found = unreal_values(reinterpret_cast<const NumpyArray*>(given.ptr())->descr->kind);
-    if (!found && array.open(numpy("array")(given, "dtype"_a = numpy("float64"), "order"_a = "C")))
+    if (!found && array.open(numpy("array")(given, "dtype"_a = "float64", "order"_a = "C")))
       return array;
   } catch (nb::python_error& error) {
     if (error.matches(PyExc_MemoryError)) throw;

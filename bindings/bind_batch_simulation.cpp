@@ -41,7 +41,7 @@ nb::tuple simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, n
   Interrupt interrupt;
   std::vector<Ending> endings;
   {
-    const nb::gil_scoped_release release;
+    const GilReleased released;
     endings = simulate_batch(all, start, {times.data, n}, columns.sample, executor,
                              [&interrupt] { return !interrupt(); });
   }

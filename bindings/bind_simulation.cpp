@@ -23,7 +23,7 @@ nb::dict advance(PySimulation& self, nb::handle times_in, nb::handle quantities)
   Interrupt interrupt;
   simulation.set_interrupt([&interrupt] { return interrupt(); });
   try {
-    const nb::gil_scoped_release release;
+    const GilReleased released;
     while (done < n &&
            simulation.advance(times.data()[done], columns.sample.at(*self.model, 0, done)))
       ++done;
@@ -133,6 +133,20 @@ void bind_ending(nb::module_& m) {
       .def_ro("iterations", &SimulationStatistics::iterations);
 }
 
+int traverse(PyObject* self, visitproc visit, void* arg) {
+  Py_VISIT(Py_TYPE(self));
+  return nb::inst_ready(self) ? nb::inst_ptr<PySimulation>(self)->traverse(visit, arg) : 0;
+}
+
+int clear(PyObject* self) {
+  nb::inst_ptr<PySimulation>(self)->clear();
+  return 0;
+}
+
+PyType_Slot collected[] = {{Py_tp_traverse, reinterpret_cast<void*>(traverse)},
+                           {Py_tp_clear, reinterpret_cast<void*>(clear)},
+                           {0, nullptr}};
+
 void bind_drives(nb::class_<PySimulation>& simulation) {
   simulation.def("drive_torque", &PySimulation::torque, "joint"_a, "values"_a)
       .def("drive_torque_table", &PySimulation::torque_table, "joint"_a, "times"_a, "values"_a,
@@ -160,7 +174,7 @@ void bind_drives(nb::class_<PySimulation>& simulation) {
 void bind_simulation(nb::module_& m) {
   bind_ending(m);
   nb::class_<PySimulation> simulation(
-      m, "Simulation",
+      m, "Simulation", nb::type_slots(collected),
       "The compiled time loop behind linkwise.simulate: Simulation(model, **options), options by "
       "the names of\n"
       "numerics(), and solver_options and threads.");

@@ -142,7 +142,7 @@ class PyConstraintSystem {
         guess.is_none() ? std::vector<double>(A().size()) : unknowns(guess, "guess");
     Report report;
     {
-      const nb::gil_scoped_release release;
+      const GilReleased released;
       report = made->solve(A(), system_.b(), f);
     }
     const Choice choice{"constraint_force", solver, "as asked for"};
@@ -221,7 +221,7 @@ class PyDynamicsMethod {
     NewArray du({size(m.nv())}, {}), loads({size(m.n_joints()), 6}, {});
     DynamicsReport report;
     {
-      const nb::gil_scoped_release release;
+      const GilReleased released;
       report = method_->evaluate(t, rows.input(m, 0), du.data, loads.data);
       if (accept && report.ok()) method_->accepted(t);
     }
@@ -251,7 +251,7 @@ nb::dict PyDynamicsMethod::follow(nb::handle times_in, nb::handle q, nb::handle 
   std::vector<Outcome> outcomes;
   Interrupt interrupt;
   {
-    const nb::gil_scoped_release release;
+    const GilReleased released;
     const Clock::time_point begin = Clock::now();
     for (size_t i = 0; i < rows.count && !interrupt(); ++i) {
       const SweepInput<double> in = rows.input(m, i);

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <thread>
 
-#include <nanobind/nanobind.h>
+#include "gil.hpp"
 
 namespace linkwise::bindings {
 
@@ -19,7 +19,7 @@ class Interrupt {
     const Clock::time_point now = Clock::now();
     if (now < next_) return false;
     next_ = now + pause;
-    const nanobind::gil_scoped_acquire acquire;
+    const GilHeld held;
     if (PyErr_CheckSignals() != 0) raised_.store(true, std::memory_order_relaxed);
     return raised_.load(std::memory_order_relaxed);
   }

@@ -14,6 +14,9 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
   const nb::object module_name = m.attr("__name__");
   m.attr("__name__") = "linkwise._core";
 
+  // A thread that outlives the interpreter keeps its objects: there is nothing to warn of.
+  nb::set_leak_warnings(false);
+  linkwise::bindings::find_numpy();
   m.attr("cpu_target") = LINKWISE_CPU_TARGET;
   m.attr("lanes") = LINKWISE_LANES;
   linkwise::bindings::bind_exception<linkwise::InputError>(

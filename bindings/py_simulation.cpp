@@ -54,8 +54,7 @@ Table make_table(nb::handle times, nb::handle values, const std::string& interpo
     throw InputError("interpolation '" + interpolation + "' is unknown; known: linear, cubic");
   table.degree = 3;
   const nb::object rows = numpy("reshape")(y.object(), nb::make_tuple(n, columns));
-  const nb::object spline =
-      nb::module_::import_("scipy.interpolate").attr("CubicSpline")(t.object(), rows);
+  const nb::object spline = python_function("scipy.interpolate", "CubicSpline")(t.object(), rows);
   const ArrayIn c =
       as_array(numpy("transpose")(spline.attr("c"), nb::make_tuple(1, 0, 2)), "coefficients");
   table.coefficients.assign(c.data(), c.data() + c.size());
@@ -124,6 +123,23 @@ Drive gains(const std::string& name, double kp, double kd) {
 
 }  // namespace
 
+std::shared_ptr<PythonFunction> PySimulation::keep(nb::callable fn) {
+  auto kept = std::make_shared<PythonFunction>(std::move(fn));
+  functions_.push_back(kept);
+  return kept;
+}
+
+int PySimulation::traverse(visitproc visit, void* arg) const {
+  for (const std::weak_ptr<PythonFunction>& function : functions_)
+    if (const auto held = function.lock()) Py_VISIT(held->ptr());
+  return 0;
+}
+
+void PySimulation::clear() {
+  for (const std::weak_ptr<PythonFunction>& function : functions_)
+    if (const auto held = function.lock()) held->forget();
+}
+
 size_t PySimulation::width(const std::string& joint) const {
   return model->joints[model->joint_index(joint)].nv;
 }
@@ -154,10 +170,10 @@ void PySimulation::torque_callable(const std::string& name, nb::callable fn, nb:
   Drive d;
   d.kind = DriveKind::torque_callable;
   d.course = course_of(breakpoints, samples, width(name));
-  d.callable = [fn, name, nq = info.nq, nv = info.nv](double t, const double* q, const double* v,
-                                                      double* out) {
-    const nb::gil_scoped_acquire acquire;
-    store(fn(t, copy_of(q, nq), copy_of(v, nv)), "torque returned for joint '" + name + "'", out,
+  d.callable = [fn = keep(std::move(fn)), name, nq = info.nq, nv = info.nv](
+                   double t, const double* q, const double* v, double* out) {
+    const GilHeld held;
+    store((*fn)(t, copy_of(q, nq), copy_of(v, nv)), "torque returned for joint '" + name + "'", out,
           nv);
   };
   set(name, std::move(d));
@@ -179,9 +195,10 @@ void PySimulation::motion_callable(const std::string& name, nb::callable fn, nb:
   Drive d;
   d.kind = DriveKind::motion;
   d.course = course_of(breakpoints, samples, width(name));
-  d.motion = [fn, name, nv = width(name)](double t, double* q, double* v, double* a) {
-    const nb::gil_scoped_acquire acquire;
-    const nb::object returned = fn(t);
+  d.motion = [fn = keep(std::move(fn)), name, nv = width(name)](double t, double* q, double* v,
+                                                                double* a) {
+    const GilHeld held;
+    const nb::object returned = (*fn)(t);
     if (!nb::isinstance<nb::sequence>(returned) || nb::len(returned) != 3)
       throw InputError("motion returned for joint '" + name +
                        "' is not three values; return position, rate and acceleration");
@@ -232,9 +249,9 @@ void PySimulation::wrench_callable(nb::handle at, nb::callable fn, const std::st
   const Frame where = as_frame(at);
   Wrench w = wrench_at(*model, where, frame);
   w.course = course_of(breakpoints, samples, 6);
-  w.callable = [fn, link = where.link](double t, double* out) {
-    const nb::gil_scoped_acquire acquire;
-    store(fn(t), "wrench returned for link '" + link + "'", out, 6);
+  w.callable = [fn = keep(std::move(fn)), link = where.link](double t, double* out) {
+    const GilHeld held;
+    store((*fn)(t), "wrench returned for link '" + link + "'", out, 6);
   };
   simulation.add_wrench(std::move(w));
 }

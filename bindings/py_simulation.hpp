@@ -37,9 +37,18 @@ class PySimulation {
                        nb::handle breakpoints, nb::handle samples);
   void start(double t0, nb::handle q, nb::handle v);
 
+  /// The garbage collector's: a user's function may refer to its own simulation, by the traceback
+  /// of an exception for one.
+  int traverse(visitproc visit, void* arg) const;
+  void clear();
+
  private:
+  std::shared_ptr<PythonFunction> keep(nb::callable fn);
   void set(const std::string& joint, Drive drive);
   size_t width(const std::string& joint) const;
+
+  std::vector<std::weak_ptr<PythonFunction>>
+      functions_;  ///< of drives and wrenches, which own them
 };
 
 }  // namespace linkwise::bindings

@@ -47,13 +47,13 @@ auto without_gil(F&& f) {
   const GoOn go_on = [&interrupt] { return !interrupt(); };
   if constexpr (std::is_void_v<decltype(f(go_on))>) {
     {
-      const nb::gil_scoped_release release;
+      const GilReleased released;
       f(go_on);
     }
     interrupt.rethrow();
   } else {
     auto result = [&] {
-      const nb::gil_scoped_release release;
+      const GilReleased released;
       return f(go_on);
     }();
     interrupt.rethrow();

@@ -67,7 +67,7 @@ THIRD_PARTIES = {
 }
 #: Headers of the compiler and of POSIX, which any layer may include.
 SYSTEM = re.compile(
-    r"([a-z_]+intrin|unistd|sched|pthread|sys/(mman|resource|stat|types))\.h|[a-z0-9_]+"
+    r"([a-z_]+intrin|unistd|sched|pthread|cxxabi|sys/(mman|resource|stat|types|wait))\.h|[a-z0-9_]+"
 )
 
 #: Packages that a function may import when it is called: optional ones, and slow ones that not

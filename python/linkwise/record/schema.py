@@ -118,10 +118,10 @@ def _scalar_variable(
         )
     else:
         units = text_array(u + row["units"] for u in scalars.units.tolist())
-    distinct = np.unique(units)
-    if distinct.size == 1:
-        attrs["units"] = str(distinct[0])
-    elif distinct.size > 1:
+    distinct = set(units.tolist())
+    if len(distinct) == 1:
+        attrs["units"] = distinct.pop()
+    elif distinct:
         attrs["units"] = f"mixed, see {name}_units"
         coordinates[f"{name}_units"] = Coordinate((dim,), units)
     everything = np.array_equal(scalars.index, np.arange(whole))

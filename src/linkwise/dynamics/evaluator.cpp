@@ -182,14 +182,21 @@ struct Evaluator::Workspace {
 class Evaluator::Lease {
  public:
   explicit Lease(const Evaluator& owner) : owner_(owner) {
-    const std::lock_guard lock(owner.mutex_);
-    if (owner.pool_.empty()) owner.pool_.push_back(std::make_unique<Workspace>(*owner.model_));
-    workspace_ = std::move(owner.pool_.back());
-    owner.pool_.pop_back();
+    for (std::atomic<Workspace*>& place : owner.idle_)
+      if (place.load(std::memory_order_relaxed))
+        if (workspace_.reset(place.exchange(nullptr, std::memory_order_acquire)); workspace_)
+          return;
+    workspace_ = std::make_unique<Workspace>(*owner.model_);
   }
   ~Lease() {
-    const std::lock_guard lock(owner_.mutex_);
-    owner_.pool_.push_back(std::move(workspace_));
+    for (std::atomic<Workspace*>& place : owner_.idle_) {
+      Workspace* none = nullptr;
+      if (place.compare_exchange_strong(none, workspace_.get(), std::memory_order_release,
+                                        std::memory_order_relaxed)) {
+        workspace_.release();
+        return;
+      }
+    }
   }
   Lease(const Lease&) = delete;
   Lease& operator=(const Lease&) = delete;
@@ -202,7 +209,9 @@ class Evaluator::Lease {
 };
 
 Evaluator::Evaluator(const Model& model) : model_(&model) {}
-Evaluator::~Evaluator() = default;
+Evaluator::~Evaluator() {
+  for (std::atomic<Workspace*>& place : idle_) delete place.load();
+}
 
 /// What computes the states: a method, one state after the other, or a kernel on lanes.
 struct Evaluator::Pick {

@@ -6,8 +6,9 @@
 //                   branches where the machine is large enough, plain otherwise
 //     many states   articulated_body, or constraint_force with thomas, on SIMD lanes; every other
 //                   method state by state
+#include <array>
+#include <atomic>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -85,8 +86,8 @@ class Evaluator {
             Choice& choice) const;
 
   const Model* model_;
-  mutable std::mutex mutex_;
-  mutable std::vector<std::unique_ptr<Workspace>> pool_;
+  /// Workspaces that nobody uses. There is no lock: another thread's fork would keep it for ever.
+  mutable std::array<std::atomic<Workspace*>, 64> idle_{};
 };
 
 }  // namespace linkwise

@@ -2,16 +2,21 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <exception>
-#include <mutex>
+#include <new>
 #include <string>
 #include <thread>
-#include <vector>
+#include <utility>
 
 #if defined(__linux__)
 #include <sched.h>
+#endif
+#if defined(__unix__) || defined(__APPLE__)
+#define LINKWISE_CAN_FORK
+#include <pthread.h>
 #endif
 
 #include "linkwise/base/error.hpp"
@@ -29,27 +34,24 @@ int available_cores() {
 
 /// A region is one number: its index in the upper bits, tasks not yet claimed in the lower bits.
 /// Every thread that is awake claims the next task, so a worker that the system does not run delays
-/// nobody.
+/// nobody. There is no lock that a fork could find taken.
 class Pool {
  public:
   static Pool& instance() {
-    static Pool pool;
+    static Pool& pool = first();
     return pool;
   }
 
   void run(int n, int threads, const std::function<void(int)>& task) {
     const int helpers = std::min(threads, n) - 1;
-    if (helpers < 1 || !region_.try_lock()) {
+    if (helpers < 1 || busy_.exchange(true, std::memory_order_acquire)) {
       for (int i = 0; i < n; ++i) task(i);
       return;
     }
-    const std::lock_guard guard(region_, std::adopt_lock);
-    while (static_cast<int>(workers_.size()) < helpers) {
-      const int index = static_cast<int>(workers_.size());
-      workers_.emplace_back([this, index, seen = number_] { work(index, seen); });
-    }
+    start_workers(helpers);
+    const unsigned life = lives;
     task_ = &task;
-    error_ = nullptr;
+    failed_.store(false, std::memory_order_relaxed);
     done_.store(0, std::memory_order_relaxed);
     helpers_.store(helpers, std::memory_order_relaxed);
     ++number_;
@@ -58,17 +60,36 @@ class Pool {
     signal_.store(number_, std::memory_order_release);
     signal_.notify_all();
     share(number_);
+    if (lives != life)  // the workers did not come along, nor what they had begun
+      throw InputError("the process was forked inside a computation of linkwise; fork outside");
     for (int i = 0; done_.load(std::memory_order_acquire) < n; ++i)
       i < spins ? relax() : std::this_thread::yield();
-    if (error_) std::rethrow_exception(error_);
+    const std::exception_ptr error = std::exchange(error_, nullptr);
+    busy_.store(false, std::memory_order_release);
+    if (error) std::rethrow_exception(error);
   }
 
  private:
-  ~Pool() {
-    stop_.store(true, std::memory_order_relaxed);
-    signal_.fetch_add(1, std::memory_order_release);
-    signal_.notify_all();
-    for (std::thread& worker : workers_) worker.join();
+  /// Nobody destroys the pool: when a process ends, its other threads may still compute, and those
+  /// of a parent process are no threads of a forked child. A child begins with a pool of its own.
+  static Pool& first() {
+    alignas(Pool) static std::byte place[sizeof(Pool)];
+#ifdef LINKWISE_CAN_FORK
+    pthread_atfork(nullptr, nullptr, [] {
+      ::new (place) Pool;
+      ++lives;
+    });
+#endif
+    return *::new (place) Pool;
+  }
+
+  /// As many as there is room for. They never end, and nobody waits for their end.
+  void start_workers(int wanted) {
+    try {
+      for (; workers_ < wanted; ++workers_)
+        std::thread([this, index = workers_, seen = number_] { work(index, seen); }).detach();
+    } catch (const std::exception&) {  // no room for more: the others claim their tasks
+    }
   }
 
   static void relax() {
@@ -87,15 +108,14 @@ class Pool {
       try {
         (*task_)(static_cast<int>(left - 1));
       } catch (...) {
-        const std::lock_guard lock(error_mutex_);
-        if (!error_) error_ = std::current_exception();
+        if (!failed_.exchange(true, std::memory_order_relaxed)) error_ = std::current_exception();
       }
       done_.fetch_add(1, std::memory_order_acq_rel);
       ticket = ticket_.load(std::memory_order_acquire);
     }
   }
 
-  void work(int index, std::uint32_t seen) {
+  [[noreturn]] void work(int index, std::uint32_t seen) {
     for (;;) {
       std::uint32_t now = signal_.load(std::memory_order_acquire);
       for (int i = 0; i < spins && now == seen; ++i) {
@@ -107,19 +127,18 @@ class Pool {
         continue;
       }
       seen = now;
-      if (stop_.load(std::memory_order_relaxed)) return;
       if (index < helpers_.load(std::memory_order_relaxed)) share(now);
     }
   }
 
   static constexpr int spins = 2000;  // some 10 us: several times the cost of a barrier
-  std::mutex region_, error_mutex_;
-  std::vector<std::thread> workers_;
+  static inline unsigned lives = 0;   // forks that led to this process, since the first region
+  std::atomic<bool> busy_{false}, failed_{false};
+  int workers_ = 0;
   std::uint32_t number_ = 0;
   std::atomic<std::uint64_t> ticket_{0};
   std::atomic<std::uint32_t> signal_{0};
   std::atomic<int> done_{0}, helpers_{0};
-  std::atomic<bool> stop_{false};
   const std::function<void(int)>* task_ = nullptr;
   std::exception_ptr error_;
 };

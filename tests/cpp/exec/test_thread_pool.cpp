@@ -4,6 +4,11 @@
 #include <thread>
 #include <vector>
 
+#if defined(__unix__)
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
+
 #include <gtest/gtest.h>
 
 #include "linkwise/base/error.hpp"
@@ -48,6 +53,60 @@ TEST(ThreadsPool, ExceptionsReachTheCallerAndThePoolGoesOn) {
   parallel_for(8, 2, [&](int) { ++count; });
   EXPECT_EQ(count, 8);
 }
+
+#if defined(__unix__) && !defined(__SANITIZE_THREAD__)  // that sanitizer takes no such forks
+/// How a child process ends that computes f, from 0 to 255.
+template <class F>
+int in_child(F&& f) {
+  const pid_t child = fork();
+  if (child == 0) {
+    alarm(600);
+    _exit(f());
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 255;
+}
+
+int sum_in_parallel() {
+  std::atomic<int> sum{0};
+  parallel_for(20, 3, [&](int i) { sum += i; });
+  return sum;
+}
+
+TEST(ThreadsPool, AForkedChildHasWorkersOfItsOwn) {
+  EXPECT_EQ(sum_in_parallel(), 190);
+  EXPECT_EQ(in_child([] { return in_child(sum_in_parallel) == 190 ? sum_in_parallel() : 0; }), 190);
+  EXPECT_EQ(sum_in_parallel(), 190);
+}
+
+TEST(ThreadsPool, AForkInsideARegionIsRefusedInTheChild) {
+  const pid_t parent = getpid();
+  const auto caller = std::this_thread::get_id();
+  std::atomic<int> tasks{0};
+  std::atomic<bool> begun{false};
+  int ended = 0;
+  bool refused = false;
+  try {
+    parallel_for(2, 2, [&](int) {
+      ++tasks;
+      if (std::this_thread::get_id() != caller) {
+        while (!begun) std::this_thread::yield();  // held by a worker, lost in the child
+        return;
+      }
+      while (tasks < 2) std::this_thread::yield();
+      const pid_t child = fork();
+      if (child) waitpid(child, &ended, 0);
+      begun = true;
+    });
+  } catch (const InputError&) {
+    refused = true;
+  }
+  if (getpid() != parent) _exit(refused && sum_in_parallel() == 190 ? 7 : 1);
+  EXPECT_FALSE(refused);
+  EXPECT_TRUE(WIFEXITED(ended) && WEXITSTATUS(ended) == 7);
+}
+#endif
 
 TEST(ThreadsPool, EnvironmentGivesTheDefault) {
   setenv("LINKWISE_THREADS", "5", 1);
