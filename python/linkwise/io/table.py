@@ -20,8 +20,9 @@ from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.files import TABLE_BYTES, read_bytes
 from linkwise.io.numbers import parse_number
 from linkwise.io.units import Unit, parse_unit
+from linkwise.io.writing import spelled
 
-_TIME_NAMES = ("time", "t")
+_TIME_NAMES = ("time", "t")  # in capitals as well
 # A name and its unit where blanks separate names.
 _BLANKS = re.compile(r"[^\s\[\]]+(?:\s*\[[^\[\]]*\])?")
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+\Z")
@@ -68,10 +69,11 @@ def read_table(path: str | os.PathLike[str]) -> CsvTable:
     """Read a CSV table.
 
     The first line that is neither empty nor a comment (``#``) is the header. One column is called
-    ``time`` or ``t``; the others are free. A name may carry a unit, as in ``elbow [deg]`` or
-    ``time [ms]``; values are converted to SI. Commas separate; if the header has none semicolons,
-    tabs or blanks do, and numbers may have decimal commas. What OpenSim writes above a header
-    (.sto, .mot) is skipped. UTF-8, or UTF-16 with its mark.
+    ``time`` or ``t``, in capitals or not; the others are free. If the first one is called ``time``,
+    others may be as well, and so may those with a unit of something else. A name may carry a unit,
+    as in ``elbow [deg]`` or ``time [ms]``; values are converted to SI. Commas separate; if the
+    header has none semicolons, tabs or blanks do, and numbers may have decimal commas. What OpenSim
+    writes above a header (.sto, .mot) is skipped. UTF-8, or UTF-16 with its mark.
 
     Raises InputError naming file, line and column for gaps (empty cells, short or empty lines),
     NaN, infinity, text, time that stands still or runs backwards, fewer than two rows.
@@ -81,7 +83,7 @@ def read_table(path: str | os.PathLike[str]) -> CsvTable:
     header_line, header = next(rows, (1, []))
     if not header:
         complain(path, "table", "is empty", "give a header line and at least two rows")
-    names, units = _header(path, header_line, header)
+    names, units, time_column = _header(path, header_line, header)
     # Arrays of machine numbers, because lists of Python objects would take several times the file's
     # size.
     data = array("d")
@@ -99,7 +101,6 @@ def read_table(path: str | os.PathLike[str]) -> CsvTable:
         )
     table = np.frombuffer(data).reshape(len(lines), len(names))
     table = table * np.array([unit.factor if unit else 1.0 for unit in units])
-    time_column = next(i for i, name in enumerate(names) if name in _TIME_NAMES)
     times = np.ascontiguousarray(table[:, time_column])
     _check_times(path, times, lines)
     others = [i for i in range(len(names)) if i != time_column]
@@ -205,13 +206,13 @@ def _preamble(path: str | os.PathLike[str], text: str) -> int:
 
 def _header(
     path: str | os.PathLike[str], line: int, cells: Sequence[str]
-) -> tuple[list[str], list[Unit | None]]:
+) -> tuple[list[str], list[Unit | None], int]:
+    """Names and units of the columns, and which one is the time."""
     names: list[str] = []
-    known: set[str] = set()
     units: list[Unit | None] = []
     for number, cell in enumerate(cells, 1):
         match = _HEADER.match(cell.strip()) if len(cell) <= 1000 else None
-        name = match.group(1) if match else cell.strip()
+        name = spelled(match.group(1) if match else cell.strip())
         element = f"column {number}"
         if not name:
             complain(path, element, "has no name", "name every column in the header", line)
@@ -219,30 +220,46 @@ def _header(
             unit = parse_unit(match.group(2)) if match else None
         except ValueError as error:
             complain(path, f"{element} '{shorten(name)}'", str(error), "use one of them", line)
-        if name in known:
-            complain(
-                path, f"{element} '{shorten(name)}'", "the name is used twice", "rename one", line
-            )
         names.append(name)
-        known.add(name)
         units.append(unit)
-    clocks = [i for i, name in enumerate(names) if name in _TIME_NAMES]
-    if len(clocks) != 1:
-        complain(
-            path,
-            "header",
-            f"has {'no' if not clocks else 'more than one'} time column",
-            "call one column 'time' (columns: "
-            f"{', '.join(shorten(n, 20) for n in names[:8])}{', ...' if len(names) > 8 else ''})",
-            line,
-        )
-    clock = units[clocks[0]]
-    if clock and clock.dimension != "time":
-        problem = f"has a unit of {clock.dimension}"
-        complain(path, "time column", problem, "use s, ms, min or h", line)
+    clock = _time_column(path, line, names, units)
+    known: set[str] = set()
+    for number, name in enumerate(names, 1):
+        if name in known:
+            element = f"column {number} '{shorten(name)}'"
+            complain(path, element, "the name is used twice", "rename one", line)
+        if number - 1 != clock:
+            known.add(name)
     if len(names) < 2:
         complain(path, "header", "has only a time column", "add a column of values", line)
-    return names, units
+    return names, units, clock
+
+
+def _time_column(
+    path: str | os.PathLike[str], line: int, names: Sequence[str], units: Sequence[Unit | None]
+) -> int:
+    """The number of the time column. A joint may be called time, too."""
+    clocks, foreign = [], []
+    for i, (name, unit) in enumerate(zip(names, units, strict=True)):
+        if name.lower() not in _TIME_NAMES:
+            continue
+        if unit is None or unit.dimension == "time":
+            clocks.append(i)
+        else:
+            foreign.append(unit.dimension)
+    if len(clocks) == 1 or (clocks and clocks[0] == 0 and names[0].lower() == "time"):
+        return clocks[0]
+    if foreign and not clocks:
+        problem = f"has a unit of {foreign[0]}"
+        complain(path, "time column", problem, "use s, ms, min or h", line)
+    complain(
+        path,
+        "header",
+        f"has {'no' if not clocks else 'more than one'} time column",
+        "call one column 'time' (columns: "
+        f"{', '.join(shorten(n, 20) for n in names[:8])}{', ...' if len(names) > 8 else ''})",
+        line,
+    )
 
 
 def _numbers(

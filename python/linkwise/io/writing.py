@@ -135,6 +135,12 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 def csv_cell(value: object) -> object:
     """`value` for a CSV file; text that a spreadsheet would compute gets an apostrophe in front."""
-    if isinstance(value, str) and value.startswith(_FORMULA_STARTS):
+    if isinstance(value, str) and value.lstrip("'").startswith(_FORMULA_STARTS):
         return f"'{value}"
     return value
+
+
+def spelled(cell: str) -> str:
+    """The text for which csv_cell wrote `cell`."""
+    is_marked = cell.startswith("'") and cell.lstrip("'").startswith(_FORMULA_STARTS)
+    return cell[1:] if is_marked else cell

@@ -153,9 +153,9 @@ GAP = "give a finite number in every cell"
             ":1: header: has no time column; call one column 'time' (columns: 0, 1)",
         ),
         (
-            "time,t,a\n0,1,2\n",
+            "t,Time,a\n0,1,2\n",
             ":1: header: has more than one time column; "
-            "call one column 'time' (columns: time, t, a)",
+            "call one column 'time' (columns: t, Time, a)",
         ),
         ("time\n0\n1\n", ":1: header: has only a time column; add a column of values"),
         ("time,a,a\n0,1,2\n", ":1: column 3 'a': the name is used twice; rename one"),
@@ -171,6 +171,33 @@ GAP = "give a finite number in every cell"
 )
 def test_defect_is_named(write, complaint, content, expected):
     assert complaint(read_table, write(content)) == expected
+
+
+@pytest.mark.parametrize(
+    ("head", "names"),
+    [
+        ("Time,a", ["a"]),
+        ("TIME [s],a", ["a"]),
+        ("T [s],a", ["a"]),
+        ("time [s],time [rad]", ["time"]),
+        ("time [s],time", ["time"]),
+        ("time,t", ["t"]),
+        ("time [s],Time [rad]", ["Time"]),
+        ("Time,time", ["time"]),
+    ],
+)
+def test_columns_called_time(write, head, names):
+    table = read_table(write(f"{head}\n0,5\n1,3\n"))
+    assert list(table.names) == names
+    np.testing.assert_array_equal(table.times, [0, 1])
+    np.testing.assert_array_equal(table.values, [[5], [3]])
+
+
+@pytest.mark.parametrize("head", ["a,Time", "time [rad],t [s]", "T [kg],Time [s]"])
+def test_the_time_need_not_stand_first(write, head):
+    table = read_table(write(f"{head}\n5,0\n3,1\n"))
+    np.testing.assert_array_equal(table.times, [0, 1])
+    np.testing.assert_array_equal(table.values, [[5], [3]])
 
 
 def test_unknown_unit_lists_the_known(write, complaint):

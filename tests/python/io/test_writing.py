@@ -9,7 +9,7 @@ import threading
 import pytest
 
 import linkwise as lw
-from linkwise.io.writing import csv_cell, write_text, written_whole
+from linkwise.io.writing import csv_cell, spelled, write_text, written_whole
 
 posix = pytest.mark.skipif(os.name != "posix", reason="needs POSIX files")
 
@@ -154,7 +154,9 @@ def test_standard_output_takes_an_export():
 
 
 def test_no_cell_is_a_formula():
-    for text in ("=1+1", "+1", "-1", "@sum", "\t=1"):
+    for text in ("=1+1", "+1", "-1", "@sum", "\t=1", "'=1"):
         assert csv_cell(text) == f"'{text}"
-    assert csv_cell("elbow.fx [N]") == "elbow.fx [N]"
+        assert spelled(csv_cell(text)) == text
+    for text in ("elbow.fx [N]", "'a'", "a=1", ""):
+        assert spelled(csv_cell(text)) == csv_cell(text) == text
     assert csv_cell(-1.5) == -1.5

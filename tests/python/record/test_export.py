@@ -65,6 +65,19 @@ def test_names_are_no_formulas(tmp_path):
     np.testing.assert_array_equal(np.array(rows, dtype=float)[:, 1:], run.position)
 
 
+@pytest.mark.parametrize("name", ["time", "Time", "t", "T", "=x", "'=x", "a, b", 'a "b"', "a [m]"])
+def test_exports_read_back_whatever_the_joints_are_called(tmp_path, name):
+    builder = lw.ModelBuilder("m")
+    builder.add_link("base")
+    builder.add_link("arm", mass=1, com=(0, 0, -1), inertia=np.eye(3))
+    builder.add_joint(name, "revolute", "base", "arm", axis=(1, 0, 0))
+    run = lw.simulate(builder.build(), q0=[0.3], duration=0.1, every=0.05)
+    run.to_csv(tmp_path / "p.csv", "position")
+    table = lw.Table.from_csv(tmp_path / "p.csv", name)
+    np.testing.assert_array_equal(table.times, run.time.values)
+    np.testing.assert_array_equal(table.values, run.position.values)
+
+
 def test_a_file_that_does_not_fit_is_refused_before_it_is_begun(tmp_path, run, monkeypatch):
     """HDF5 would crash the process later."""
     import shutil
