@@ -112,7 +112,10 @@ def _check(color: str, export: Path | None, host: str, port: int) -> None:
 def _export(source: Source, path: Path, by_rating: bool, as_json: bool) -> None:
     from linkwise.view.export import write_html
 
+    told = len(source.notes)
     written = write_html(source, path, by_rating=by_rating)
+    for note in source.notes[told:]:  # of meshes that were opened only now
+        say(note)
     _report(
         as_json,
         {
@@ -132,7 +135,11 @@ def _serve(
 ) -> None:
     from linkwise.view.live import show
 
+    told = len(source.notes)
+
     def started(address: str) -> None:
+        for note in source.notes[told:]:
+            say(note)
         facts = {"address": address, "warnings": list(source.warnings)}
         _report(as_json, facts, f"{address} shows {source.title}; Ctrl-C ends.")
 

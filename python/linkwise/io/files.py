@@ -101,4 +101,12 @@ def resolve_mesh(
         candidates += [base / inside for base in (folder, *folder.parents) if base.name == package]
     else:
         return None
-    return next((c for c in candidates if c.is_file()), None)
+    return next((c for c in candidates if _is_file(c)), None)
+
+
+def _is_file(path: Path) -> bool:
+    """Whether a file stands there; not where no file could, such as under 5,000 letters."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False

@@ -24,6 +24,8 @@ Color = tuple[float, float, float, float]
 MESH_SUFFIXES = (".stl", ".dae", ".obj", ".ply", ".glb", ".off")
 MESH_BYTES = 64 << 20
 """Largest mesh file read."""
+MOST = 1e18
+"""Largest length or coordinate drawn, m; pictures have single precision, and square them."""
 
 
 @dataclass(frozen=True)
@@ -151,8 +153,13 @@ def _visual(
             return None
     else:
         return None
+    if max(np.abs(pose).max(), np.abs(size).max()) > MOST:
+        raise ValueError
     return Visual(link, kind, pose, (float(size[0]), float(size[1]), float(size[2])), color, path)
 
 
 def _readable(path: Path) -> bool:
-    return path.suffix.lower() in MESH_SUFFIXES and path.stat().st_size <= MESH_BYTES
+    try:
+        return path.suffix.lower() in MESH_SUFFIXES and path.stat().st_size <= MESH_BYTES
+    except OSError:
+        return False

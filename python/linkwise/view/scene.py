@@ -11,6 +11,7 @@ import numpy as np
 
 from linkwise import _core
 from linkwise.base import Array
+from linkwise.io.complaint import shorten
 from linkwise.io.urdf_visuals import Visual
 from linkwise.view.meshes import load_mesh
 from linkwise.view.placement import (
@@ -173,7 +174,7 @@ class Scene:
         if path is not None:
             mesh = load_mesh(path, first.color)
             if mesh is None:
-                notes.append(f"mesh {path.name!r} cannot be read and is left out")
+                notes.append(f"mesh {shorten(path.name)!r} cannot be read and is left out")
                 return None
             self.toggles.setdefault("Meshes", True)
             return self._scene.add_batched_meshes_trimesh(

@@ -12,7 +12,7 @@ import numpy as np
 
 from linkwise._core import InputError, Model, inverse_dynamics_loads
 from linkwise.base import Array, rows_per_block
-from linkwise.io.complaint import near
+from linkwise.io.complaint import near, shorten
 from linkwise.io.load import load
 from linkwise.io.urdf_visuals import Appearance, read_appearance
 from linkwise.loads.samples import held_model, model_of, rows
@@ -237,7 +237,7 @@ def _check_same_machine(run: Run, model: Model, file: Path) -> None:
 def _notes(appearance: Appearance) -> list[str]:
     if not appearance.missing:
         return []
-    first = Path(appearance.missing[0]).name
+    first = shorten(Path(appearance.missing[0]).name)
     return [
         f"{len(appearance.missing)} meshes are not on this disk (the first is {first!r}); "
         "--package-dir says where packages are"
