@@ -15,6 +15,7 @@ STUDIES = (
     "million_links",
     "iterations",
     "stop_tests",
+    "stiff_machines",
     "publish",
 )
 

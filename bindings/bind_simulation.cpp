@@ -195,6 +195,10 @@ void bind_simulation(nb::module_& m) {
           "interrupt", [](PySimulation& s) { s.simulation.stop(Outcome::interrupted); },
           "End what still runs.")
       .def_prop_ro("statistics", [](const PySimulation& s) { return s.simulation.statistics(); })
+      .def_prop_ro(
+          "stiffness", [](const PySimulation& s) { return s.simulation.stiffness(); },
+          "Since when the motion is stiff and what follows, one line; empty where nothing was "
+          "noticed.")
       .def(
           "keep_trace",
           [](PySimulation& s, bool wanted) {

@@ -20,6 +20,19 @@ HALVES = (("force", "N", COMPONENTS[:3]), ("moment", "N m", COMPONENTS[3:]))
 BLOCK_BYTES = 64 << 20
 
 
+def lengths(vectors: AnyArray) -> Array:
+    """Euclidean lengths along the last axis, also where the squares of huge components overflow."""
+    with np.errstate(over="ignore"):
+        found = np.asarray(np.linalg.norm(vectors, axis=-1))
+    huge = np.isinf(found)
+    if huge.any():
+        largest = np.abs(vectors[huge]).max(axis=-1)
+        with np.errstate(invalid="ignore", over="ignore"):
+            scaled = largest * np.linalg.norm(vectors[huge] / largest[:, None], axis=-1)
+        found[huge] = np.where(np.isinf(largest), largest, scaled)
+    return found
+
+
 def rows_per_block(row_bytes: int) -> int:
     """How many rows of this size are held at once, at least one."""
     return max(1, BLOCK_BYTES // max(1, row_bytes))

@@ -19,7 +19,7 @@ def body(joint, **properties):
 
 
 def numerics(integrator, tolerance=1e-6):
-    if integrator in ("adams", "bdf"):
+    if integrator in ("auto", "adams", "bdf"):
         return lw.Numerics(integrator=integrator, tolerance=tolerance)
     return lw.Numerics(integrator=integrator, step=0.01)
 

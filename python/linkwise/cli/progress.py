@@ -22,9 +22,10 @@ def _clock(seconds: float) -> str:
 
 def describe(progress: Progress) -> str:
     """The figures of one moment, as the live line shows them."""
+    stiff = "   stiff" if progress.stiff else ""
     return (
         f"t = {progress.time:.3f} of {progress.duration:g} s   "
-        f"{progress.speed:.3g} x real time   {_clock(progress.remaining)} left"
+        f"{progress.speed:.3g} x real time   {_clock(progress.remaining)} left{stiff}"
     )
 
 

@@ -80,7 +80,7 @@ def member_records(found: xr.Dataset, keys: list[str]) -> list[dict[str, Any]]:
     """Per member its values, how it went, and the largest force and moment and where."""
     import numpy as np
 
-    from linkwise.base import HALVES
+    from linkwise.base import HALVES, lengths
 
     records = []
     for k in range(found.sizes["member"]):
@@ -91,7 +91,7 @@ def member_records(found: xr.Dataset, keys: list[str]) -> list[dict[str, Any]]:
             if "joint_load" not in found:
                 continue
             load = member["joint_load"].sel(component=list(components))
-            size = np.linalg.norm(load.transpose("time", "joint", "component").values, axis=-1)
+            size = lengths(load.transpose("time", "joint", "component").values)
             at = np.unravel_index(int(np.nanargmax(size)), size.shape)
             record |= {
                 f"largest_{half}": float(size[at]),

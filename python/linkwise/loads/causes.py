@@ -9,7 +9,7 @@ import numpy as np
 
 from linkwise import _core
 from linkwise._core import InputError
-from linkwise.base import Array
+from linkwise.base import Array, lengths
 from linkwise.loads.samples import (
     drive_kinds,
     external,
@@ -164,6 +164,6 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
 def along_total(shares: Array) -> tuple[Array, Array]:
     """Shares (time, cause, 3) along their sum (time, cause), and the size of the sum (time,)."""
     total = shares.sum(axis=1)
-    size = np.linalg.norm(total, axis=-1)
+    size = lengths(total)
     direction = total / np.where(size > 0, size, 1.0)[:, None]
     return np.einsum("tci,ti->tc", shares, direction), size

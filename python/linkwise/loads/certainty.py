@@ -18,7 +18,7 @@ import numpy as np
 
 from linkwise import _core
 from linkwise._core import InputError
-from linkwise.base import Array
+from linkwise.base import Array, lengths
 from linkwise.loads.engineering import derive, derived_rows, joint_directions
 from linkwise.loads.peaks import summary
 from linkwise.loads.samples import (
@@ -71,8 +71,8 @@ def _algebraic(run: RunLike, model: Model, names: list[str]) -> Array:
         refined = refined_loads(run, model, where)
         first, second = derive(recorded, directions), derive(refined, directions)
         scale = {
-            "force": np.linalg.norm(recorded[..., :3], axis=-1).max(axis=1),
-            "moment": np.linalg.norm(recorded[..., 3:], axis=-1).max(axis=1),
+            "force": lengths(recorded[..., :3]).max(axis=1),
+            "moment": lengths(recorded[..., 3:]).max(axis=1),
         }
         for k, name in enumerate(names):
             if name not in first:  # power: the drives' torques are given

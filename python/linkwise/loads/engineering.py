@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from linkwise.base import Array
+from linkwise.base import Array, lengths
 from linkwise.loads.samples import Selection, joint_names, model_of, need, rows, select
 
 if TYPE_CHECKING:
@@ -73,11 +73,11 @@ def derive(load: Array, directions: Array) -> dict[str, Array]:
     axial = np.einsum("...ji,ji->...j", force, directions)
     torque = np.einsum("...ji,ji->...j", moment, directions)
     return {
-        "force": np.linalg.norm(force, axis=-1),
+        "force": lengths(force),
         "axial": axial,
-        "radial": np.linalg.norm(force - axial[..., None] * directions, axis=-1),
-        "moment": np.linalg.norm(moment, axis=-1),
-        "tilting_moment": np.linalg.norm(moment - torque[..., None] * directions, axis=-1),
+        "radial": lengths(force - axial[..., None] * directions),
+        "moment": lengths(moment),
+        "tilting_moment": lengths(moment - torque[..., None] * directions),
         "torque": torque,
     }
 

@@ -72,7 +72,8 @@ def _rainflow() -> object:
 
 def _count(values: Array) -> Array:
     """Rainflow cycles of a signal: rows of (range, mean, count), count 1 or 0.5 [astm1985]."""
-    counted = [cycle[:3] for cycle in _rainflow().extract_cycles(values)]  # type: ignore[attr-defined]
+    with np.errstate(over="ignore"):  # of a run that went astray
+        counted = [cycle[:3] for cycle in _rainflow().extract_cycles(values)]  # type: ignore[attr-defined]
     return np.array(counted, dtype=np.float64).reshape(-1, 3)
 
 

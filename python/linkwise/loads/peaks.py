@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.base import HALVES, Array
+from linkwise.base import HALVES, Array, lengths
 from linkwise.loads.engineering import QUANTITIES, derived_rows, has_power, joint_directions
 from linkwise.loads.samples import (
     blocks,
@@ -49,8 +49,9 @@ class _Statistics:
         inner = values[:, first : first + count]
         self.minimum = np.minimum(self.minimum, inner.min(axis=1))
         self.maximum = np.maximum(self.maximum, inner.max(axis=1))
-        self.total += np.einsum("t,qtj->qj", weights, inner)
-        self.squares += np.einsum("t,qtj->qj", weights, inner**2)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a run that went astray
+            self.total += np.einsum("t,qtj->qj", weights, inner)
+            self.squares += np.einsum("t,qtj->qj", weights, inner**2)
         size = np.abs(inner)
         at = np.argmax(np.where(np.isnan(size), -1.0, size), axis=1)
         best = np.take_along_axis(size, at[:, None], axis=1)[:, 0]
@@ -197,7 +198,7 @@ def peak_loads(run: RunLike) -> xr.Dataset:
     when = np.zeros((2, len(names)))
     for where in blocks(run, 48 * len(names)):
         load = rows(run, "joint_load", where).reshape(-1, len(names), 2, 3)
-        size = np.linalg.norm(load, axis=-1)
+        size = lengths(load)
         at = np.argmax(size, axis=0)
         peak = np.take_along_axis(size, at[None], axis=0)[0].T
         better = peak > largest

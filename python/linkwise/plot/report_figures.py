@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
-from linkwise.base import HALVES, Array
+from linkwise.base import HALVES, Array, lengths
 from linkwise.loads.causes import Split, along_total
 from linkwise.loads.energy import energy_balance
 from linkwise.loads.engineering import derive, joint_directions
@@ -66,7 +66,7 @@ def _histories(load: Array) -> list[Figure]:
     for k, (half, unit, components) in enumerate(HALVES):
         part = load[:, 3 * k : 3 * k + 3]
         data = [_line(name, TIMES, part[:, c]) for c, name in enumerate(components)]
-        data.append(_line("size", TIMES, np.linalg.norm(part, axis=1), line={"color": "black"}))
+        data.append(_line("size", TIMES, lengths(part), line={"color": "black"}))
         layout = _layout(half.capitalize(), "time [s]", f"{half} [{unit}]")
         made.append({"data": data, "layout": layout})
     return made

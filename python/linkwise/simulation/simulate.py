@@ -6,7 +6,7 @@ import contextlib
 import json
 import os
 import time as clock
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -163,8 +163,12 @@ def _record(
     schema: Schema,
     times: npt.NDArray[np.float64],
     progress: Callable[[Progress], object] | None,
+    ignored: Sequence[Ignored],
 ) -> tuple[Run, Ending]:
-    """Simulate and record. Whatever goes wrong, the samples so far become a complete run."""
+    """Simulate and record. Whatever goes wrong, the samples so far become a complete run.
+
+    ignored: what its reader should know from before the run.
+    """
     started = clock.monotonic()
     try:
         ending = run_time_loop(simulation, record, schema, times, progress)
@@ -173,10 +177,16 @@ def _record(
         # full.
         said = {"outcome": "error", "message": f"{type(error).__name__}: {error}"}
         with contextlib.suppress(Exception):
-            record.finish(said)
+            record.finish(said | warning_attrs([*_stiffness(simulation), *ignored]))
         raise
-    finished = record.finish(_attributes_at_end(simulation, clock.monotonic() - started))
+    attrs = _attributes_at_end(simulation, clock.monotonic() - started)
+    finished = record.finish(attrs | warning_attrs([*_stiffness(simulation), *ignored]))
     return Run(finished, record.path, model), ending
+
+
+def _stiffness(simulation: Simulation) -> list[Ignored]:
+    """What the integrator noticed about stiffness, for the run's warnings."""
+    return [Ignored("", "integrator", simulation.stiffness)] if simulation.stiffness else []
 
 
 def _attributes_at_end(simulation: Simulation, wall_time: float) -> dict[str, Any]:
@@ -271,7 +281,7 @@ def simulate(
 
     What was ignored or assumed when the model was made is in `run.warnings`, and a ModelWarning
     each where `linkwise.load` did not say it. `run.warnings` also names tables that do not cover
-    the run and functions whose short changes may be missed.
+    the run, functions whose short changes may be missed, and since when the motion is stiff.
     """
     sampled = sample_times(duration, every, times)
     start = (
@@ -309,12 +319,13 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_name)
-    attrs |= warning_attrs([*notes, *warnings_of(model)])
+    ignored = [*notes, *warnings_of(model)]
+    attrs |= warning_attrs(ignored)
     if output is None:
         _require_memory(schema, sampled.size)
     tell(warnings_of(model), reading=False)
     recorder = _recorder(model, schema, attrs, sampled.size, output)
-    run, ending = _record(model, simulation, recorder, schema, sampled, progress)
+    run, ending = _record(model, simulation, recorder, schema, sampled, progress, ignored)
     if on_failure == "raise":
         raise_failure(model, ending, run)
     return run

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from linkwise._core import InputError
-from linkwise.notes import Ignored, quiet, tell, warning_attrs, warnings_of
+from linkwise.notes import Ignored, quiet, recorded_warnings, tell, warning_attrs, warnings_of
 from linkwise.scenario import Scenario, load_scenario, variant
 from linkwise.simulation.simulate import simulate
 
@@ -64,8 +64,8 @@ def sweep(
     Returns:
         The runs' variables with a first dimension `member`, whose coordinates are the keys of
         `axes` and `outcome`. Samples after a member's end are NaN. Pick one out by
-        `linkwise.Run(dataset.sel(member=k))`. What was ignored or assumed in any member is in the
-        attribute `warnings`, and one ModelWarning.
+        `linkwise.Run(dataset.sel(member=k))`. What was ignored or assumed in any member, and what
+        its run noticed, is in the attribute `warnings`; the former is one ModelWarning, too.
 
     Raises:
         InputError: a member is wrong; nothing was simulated.
@@ -98,7 +98,16 @@ def sweep(
     }
     outcomes = [str(dataset.attrs["outcome"]) for dataset in datasets]
     columns |= {"member": np.arange(len(members)), "outcome": ("member", outcomes)}
-    return joined.assign_coords(columns).assign_attrs(warning_attrs(ignored))
+    return joined.assign_coords(columns).assign_attrs(_warnings(ignored, datasets))
+
+
+def _warnings(ignored: Iterable[Ignored], datasets: Iterable[xr.Dataset]) -> dict[str, str]:
+    """The models' own and what the members' runs noticed, each once."""
+    noticed = (entry for dataset in datasets for entry in recorded_warnings(dataset.attrs))
+    found = {(entry.element, entry.text): entry for entry in ignored}
+    for entry in noticed:
+        found.setdefault((entry["element"], entry["text"]), Ignored("", **entry))
+    return warning_attrs(found.values())
 
 
 def _run_all(

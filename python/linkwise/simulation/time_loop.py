@@ -34,6 +34,7 @@ class Progress(NamedTuple):
     wall_time: float
     steps: int
     evaluations: int
+    stiff: bool = False  #: noticed so far; `run.warnings` will say since when
 
     @property
     def speed(self) -> float:
@@ -150,7 +151,8 @@ def run_time_loop(
                     break
                 if progress is not None:
                     wall, done = clock.monotonic() - started, simulation.statistics
-                    progress(Progress(reached, end, wall, done.steps, done.evaluations))
+                    counts = done.steps, done.evaluations
+                    progress(Progress(reached, end, wall, *counts, bool(simulation.stiffness)))
                 if interrupt.pressed:
                     break
         except KeyboardInterrupt:

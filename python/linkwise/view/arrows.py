@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from linkwise.base import Array
+from linkwise.base import Array, lengths
 from linkwise.view.shapes import turning_z_to
 
 # From small to large; the lightness falls evenly, so that the order survives a grey print.
@@ -85,7 +85,7 @@ def instances(
 
     The colour is that of the share, or of `use`, the shares of a rating.
     """
-    size = np.linalg.norm(vectors, axis=1)
+    size = lengths(vectors)
     size = np.where(np.isfinite(size), size, 0.0)
     share = size / largest if largest > 0 else np.zeros_like(size)
     up = np.array([0.0, 0.0, 1.0])

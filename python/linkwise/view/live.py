@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from linkwise.base import lengths
 from linkwise.view.joint_sliders import JointSliders
 from linkwise.view.load_plot import LoadPlot
 from linkwise.view.panel import (
@@ -137,8 +138,7 @@ class View:
         q = model.initial_configuration() if self._sliders is None else self._sliders.q.copy()
         loads = static_loads(model, q)
         largest = tuple(
-            float(np.linalg.norm(half, axis=1).max(initial=0.0))
-            for half in (loads[:, :3], loads[:, 3:])
+            float(lengths(half).max(initial=0.0)) for half in (loads[:, :3], loads[:, 3:])
         )
         self._largest = (largest[0], largest[1])
         self.scene.style.largest = self._largest
@@ -170,7 +170,7 @@ class View:
 
     def _tell(self, head: str, load: np.ndarray) -> None:
         if self._choice is not None:
-            force, moment = np.linalg.norm(load[:3]), np.linalg.norm(load[3:])
+            force, moment = lengths(load.reshape(2, 3))
             self._choice.tell(f"{head}{force:.4g} N, {moment:.4g} N m")
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.base import HALVES, Array
+from linkwise.base import HALVES, Array, lengths
 
 if TYPE_CHECKING:
     import viser
@@ -49,9 +49,7 @@ class LoadPlot:
     def choose(self, joint: int) -> None:
         """Show the load of this joint; drawn with the next `show`."""
         self._times, loads = self._recording.history(joint, MOST_SAMPLES)
-        self._columns = [
-            (np.linalg.norm(half, axis=1), *half.T) for half in (loads[:, :3], loads[:, 3:])
-        ]
+        self._columns = [(lengths(half), *half.T) for half in (loads[:, :3], loads[:, 3:])]
         self._dot = -1
 
     def show(self, time: float) -> None:

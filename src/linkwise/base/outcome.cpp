@@ -25,10 +25,10 @@ constexpr OutcomeEntry table[] = {
      "use a solver that converges for every mechanism: 'conjugate_gradient', 'gauss_seidel' or "
      "'thomas'"},
     {Outcome::step_too_small, "step_too_small", "no step, however small, meets the tolerance",
-     "look for a jump in a drive or a singular motion at this time, loosen the tolerance, or try "
-     "bdf"},
+     "look for a jump in a drive or a singular motion at this time, loosen the tolerance, or leave "
+     "the integrator at auto"},
     {Outcome::too_many_steps, "too_many_steps", "the allowed number of steps is used up",
-     "allow more by max_steps, loosen the tolerance, or try bdf if the system is stiff"},
+     "allow more by max_steps, loosen the tolerance, or leave the integrator at auto"},
     {Outcome::interrupted, "interrupted", "it was interrupted", "start it again"},
 };
 

@@ -9,12 +9,13 @@
 namespace linkwise {
 
 using MakeIntegrator = std::unique_ptr<Integrator>(OdeSystem&, const IntegratorOptions&);
-MakeIntegrator make_adams, make_bdf, make_runge_kutta_4, make_semi_implicit_euler;
+MakeIntegrator make_auto, make_adams, make_bdf, make_runge_kutta_4, make_semi_implicit_euler;
 
 namespace {
 
 constexpr IntegratorEntry entries[] = {
 #if defined(LINKWISE_WITH_SUNDIALS)
+    {"auto", "adams, and bdf where the motion turns out to be stiff", false, 12, make_auto},
     {"adams",
      "variable-order Adams, 1 to 12, functional iteration (CVODE); for motion that is not stiff",
      false, 12, make_adams},
@@ -90,7 +91,7 @@ const IntegratorEntry& find_integrator(std::string_view name) {
 #if defined(LINKWISE_WITH_SUNDIALS)
   constexpr std::string_view why = "";
 #else
-  constexpr std::string_view why = "; this build has no SUNDIALS, hence no adams and no bdf";
+  constexpr std::string_view why = "; this build has no SUNDIALS, hence no auto, adams and bdf";
 #endif
   throw InputError("unknown integrator '" + std::string(name) + "'; known are " + known_names() +
                    std::string(why));

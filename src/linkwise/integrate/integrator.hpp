@@ -26,6 +26,12 @@ struct OdeSystem {
   /// may then try a smaller step, and end with that outcome where none helps.
   virtual Outcome evaluate(double t, const double* y, double* ydot) = 0;
 
+  /// The same, and leaves no trace in what evaluate() gives: for looks at states that are not on
+  /// the way. Systems that remember earlier evaluations override it.
+  virtual Outcome evaluate_aside(double t, const double* y, double* ydot) {
+    return evaluate(t, y, ydot);
+  }
+
   /// Writes qdot for the velocities v, which is not v where a joint has a quaternion.
   virtual void position_rates(const double* q, const double* v, double* qdot) = 0;
 
@@ -53,17 +59,18 @@ struct IntegratorOptions {
   double absolute_tolerance = 0.0;  ///< 0: as tolerance
   double step = 0.0;                ///< of the fixed-step kinds, which need it
   double max_step = 0.0;            ///< of the variable-step kinds; 0: no bound
-  int max_order = 0;                ///< of the multistep kinds; 0: 12 for adams, 5 for bdf
-  long max_steps = 0;               ///< for one start(); 0: no bound
+  int max_order = 0;   ///< of the multistep kinds; 0: 12 for adams, 5 for bdf; auto takes both
+  long max_steps = 0;  ///< for one start(); 0: no bound
 };
 
 struct IntegratorStatistics {
   long steps = 0;
-  long evaluations = 0;
+  long evaluations = 0;  ///< with those that looked for stiffness
   long error_test_failures = 0;
   long nonlinear_failures = 0;
   double last_step = 0.0;
   int last_order = 0;
+  double cost = 0.0;  ///< of multistep kinds: evaluations, and linear algebra in units of one
 };
 
 /// Advances one OdeSystem, which must outlive it. Exceptions of the system pass through.
@@ -88,6 +95,8 @@ class Integrator {
 
   virtual double time() const = 0;
   virtual IntegratorStatistics statistics() const = 0;
+  /// Since when the motion is stiff and what follows, one line; empty where nothing was noticed.
+  virtual std::string stiffness() const { return {}; }
 };
 
 struct IntegratorEntry {

@@ -6,6 +6,7 @@ namespace linkwise {
 
 BodyVelocityState::BodyVelocityState(const Model& model, const DynamicsOptions& options, Host host)
     : model_(model),
+      options_(options),
       host_(std::move(host)),
       velocities_(model, options),
       y_(size()),
@@ -32,6 +33,14 @@ Outcome BodyVelocityState::evaluate(double t, const double* y, double* ydot) {
   const SweepInput<double> in = host_.input(t, y, rates_.data());
   return host_.judge(
       t, [&] { return velocities_.evaluate(t, in, w, dw); }, dw, velocities_.size());
+}
+
+Outcome BodyVelocityState::evaluate_aside(double t, const double* y, double* ydot) {
+  if (!aside_) aside_ = std::make_unique<BodyVelocities>(model_, options_);
+  const double* w = y + model_.nq();
+  position_rates(y, w, ydot);
+  const SweepInput<double> in = host_.input(t, y, rates_.data());
+  return aside_->evaluate(t, in, w, ydot + model_.nq()).outcome;
 }
 
 void BodyVelocityState::position_rates(const double* q, const double* w, double* qdot) {

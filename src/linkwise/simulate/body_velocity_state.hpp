@@ -20,6 +20,7 @@ class BodyVelocityState final : public IntegratedState {
   int size() const override { return model_.nq() + velocities_.size(); }
   int position_size() const override { return model_.nq(); }
   Outcome evaluate(double t, const double* y, double* ydot) override;
+  Outcome evaluate_aside(double t, const double* y, double* ydot) override;
   void position_rates(const double* q, const double* w, double* qdot) override;
   void normalise(double* y) override { normalise_quaternions(model_, y); }
   void accepted(double t, const double* y) override;
@@ -27,8 +28,10 @@ class BodyVelocityState final : public IntegratedState {
   bool breaks_at(double t) override { return host_.step_limits->breaks_at(t); }
 
   const Model& model_;
+  DynamicsOptions options_;
   Host host_;
   BodyVelocities velocities_;
+  std::unique_ptr<BodyVelocities> aside_;  ///< made when first needed
   std::vector<double> y_, rates_;
   double drift_ = 0;
 };

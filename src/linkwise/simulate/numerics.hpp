@@ -14,7 +14,7 @@ namespace linkwise {
 struct Numerics {
   double tolerance = 1e-6;
   std::optional<double> step_tolerance;
-  std::string integrator = "adams";
+  std::string integrator = "auto";
   std::optional<double> step, max_step;
   std::string method = "auto";
   std::string solver = "auto";

@@ -16,7 +16,7 @@ struct SimulationOptions {
   /// The energy-norm rule of an iterative solver follows the integrator's error test, where it has
   /// one: see SolverTolerance. Otherwise its tolerance is that of the solver options.
   bool follow_error_test = false;
-  std::string integrator = "adams";
+  std::string integrator = "auto";
   IntegratorOptions integration;
 };
 

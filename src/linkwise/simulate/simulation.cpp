@@ -75,6 +75,7 @@ void Simulation::start(double t0, const Start& start) {
 void Simulation::make_methods(double t0) {
   method_.reset();
   output_method_.reset();
+  aside_method_.reset();
   solver_tolerance_.reset();
   lanes_.reset();
   if (members_ > 1) {
@@ -210,6 +211,19 @@ std::string Simulation::described(Outcome outcome, int body) const {
 
 Outcome Simulation::evaluate(double t, const double* y, double* ydot) {
   if (solver_tolerance_) solver_tolerance_->set(t);
+  return evaluate_by(method_.get(), t, y, ydot);
+}
+
+/// Warm starts, the trace of evaluations and the reason of a failure stay what they are.
+Outcome Simulation::evaluate_aside(double t, const double* y, double* ydot) {
+  if (!aside_method_) aside_method_ = make_dynamics(setup_->driven(), setup_->options.dynamics);
+  const Ending failure = failure_;
+  const Outcome outcome = evaluate_by(aside_method_.get(), t, y, ydot);
+  failure_ = failure;
+  return outcome;
+}
+
+Outcome Simulation::evaluate_by(DynamicsMethod* method, double t, const double* y, double* ydot) {
   const bool given = setup_->any_motion(), ended = any_ended();
   double* dv = rates_in(ydot);
   if (given || ended || !parent_axes_.trivial()) {
@@ -220,7 +234,7 @@ Outcome Simulation::evaluate(double t, const double* y, double* ydot) {
     y = evaluated_.data();
   }
   calc_position_rates(y, rates_in(y), ydot);
-  const Outcome outcome = accelerations(method_.get(), t, y, dv, nullptr);
+  const Outcome outcome = accelerations(method, t, y, dv, nullptr);
   for (size_t i = 0; i < members_; ++i)
     parent_axes_.derivative_from_child(y + i * nq(), rates_in(y) + i * nv(), dv + i * nv());
   for (size_t i = 0; i < members_ && (given || any_ended()); ++i) {

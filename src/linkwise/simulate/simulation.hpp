@@ -57,6 +57,8 @@ class Simulation : private OdeSystem {
 
   const Ending& ending(size_t member = 0) const { return endings_[member]; }
   SimulationStatistics statistics() const;
+  /// As Integrator::stiffness().
+  std::string stiffness() const { return integrator_ ? integrator_->stiffness() : std::string(); }
   /// Ends what still runs.
   void stop(Outcome outcome) { end_all({outcome, integrator_->time(), "", describe(outcome)}); }
 
@@ -84,6 +86,7 @@ class Simulation : private OdeSystem {
   int size() const override { return static_cast<int>(members_ * (nq() + nv())); }
   int position_size() const override { return static_cast<int>(members_ * nq()); }
   Outcome evaluate(double t, const double* y, double* ydot) override;
+  Outcome evaluate_aside(double t, const double* y, double* ydot) override;
   void position_rates(const double* q, const double* v, double* qdot) override;
   void normalise(double* y) override;
   void accepted(double t, const double* y) override;
@@ -95,6 +98,7 @@ class Simulation : private OdeSystem {
   bool follows_error_test() const;
   SweepInput<double> input(double t, const double* q, const double* v);
   BatchInput rows(const double* y, size_t member) const;
+  Outcome evaluate_by(DynamicsMethod* method, double t, const double* y, double* ydot);
   Outcome accelerations(DynamicsMethod* method, double t, const double* y, double* du,
                         double* loads);
   Outcome on_lanes(double t, const double* y, double* du, double* loads);
@@ -125,6 +129,7 @@ class Simulation : private OdeSystem {
   std::optional<StepLimits> step_limits_;
   /// Of one member; loads at output times are computed apart, to the fixed tolerance.
   std::unique_ptr<DynamicsMethod> method_, output_method_;
+  std::unique_ptr<DynamicsMethod> aside_method_;       ///< made when first needed
   std::unique_ptr<SolverTolerance> solver_tolerance_;  ///< of one member; null: a fixed one
   std::unique_ptr<BatchEvaluator> lanes_;              ///< of several
   std::unique_ptr<BatchEvaluator> inverse_;            ///< made when first needed

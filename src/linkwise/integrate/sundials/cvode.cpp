@@ -18,15 +18,13 @@
 #include "linkwise/base/assert.hpp"
 #include "linkwise/integrate/checked_system.hpp"
 #include "linkwise/integrate/sundials/handles.hpp"
+#include "linkwise/integrate/sundials/newton_cost.hpp"
 
 namespace linkwise {
 namespace {
 
 using namespace sundials;
 
-/// Up to this many unknowns the Newton matrix is formed by differences, one evaluation per column,
-/// and factorised. Above, GMRES needs one evaluation per iteration and no matrix.
-constexpr int largest_dense_size = 400;
 constexpr int krylov_dimension = 30;
 
 /// Quaternions that drifted this far from unit length are put back by a restart of the method,
@@ -63,6 +61,7 @@ class Cvode final : public Integrator {
   std::size_t size() const { return system_.size(); }
 
   CheckedSystem system_;
+  int method_;
   IntegratorOptions options_;
   Context context_;
   Vector y_;        ///< what CVODE returned last
@@ -80,11 +79,11 @@ class Cvode final : public Integrator {
   long steps_since_failure_ = 0;
   std::exception_ptr exception_;
   IntegratorStatistics counters_;  ///< since the last restart, as CVODE counts
-  IntegratorStatistics earlier_;   ///< before it
+  IntegratorStatistics earlier_;   ///< before it; their cost is that of linear algebra
 };
 
 Cvode::Cvode(int method, OdeSystem& system, const IntegratorOptions& options)
-    : system_(system), options_(options) {
+    : system_(system), method_(method), options_(options) {
   // CVODE's norm is a mean over the components: a system without any gets one that stays zero.
   const auto length = static_cast<sunindextype>(std::max<std::size_t>(size(), 1));
   y_.reset(check_allocated(N_VNew_Serial(length, context_)));
@@ -177,6 +176,7 @@ void Cvode::restart() {
   earlier_.steps += counters_.steps;
   earlier_.error_test_failures += counters_.error_test_failures;
   earlier_.nonlinear_failures += counters_.nonlinear_failures;
+  earlier_.cost += counters_.cost;
   counters_ = {};
   interpolant_valid_ = false;
   restart_needed_ = false;
@@ -250,6 +250,13 @@ void Cvode::read_counters() {
   CVodeGetNumNonlinSolvConvFails(memory, &counters_.nonlinear_failures);
   CVodeGetLastStep(memory, &counters_.last_step);
   CVodeGetLastOrder(memory, &counters_.last_order);
+  if (method_ == CV_ADAMS) return;
+  const int n = static_cast<int>(size());
+  long factors = 0, solutions = 0;
+  CVodeGetNumLinSolvSetups(memory, &factors);
+  CVodeGetNumNonlinSolvIters(memory, &solutions);
+  counters_.cost = static_cast<double>(factors) * factor_cost(n) +
+                   static_cast<double>(solutions) * solution_cost(n);
 }
 
 void Cvode::interpolate(double t, std::span<double> y) {
@@ -270,12 +277,13 @@ IntegratorStatistics Cvode::statistics() const {
   result.evaluations = system_.evaluations;
   result.error_test_failures += earlier_.error_test_failures;
   result.nonlinear_failures += earlier_.nonlinear_failures;
+  result.cost += earlier_.cost + static_cast<double>(system_.evaluations);
   return result;
 }
 
 }  // namespace
 
-std::unique_ptr<Integrator> make_adams(OdeSystem& system, const IntegratorOptions& options) {
+std::unique_ptr<Integrator> make_plain_adams(OdeSystem& system, const IntegratorOptions& options) {
   return std::make_unique<Cvode>(CV_ADAMS, system, options);
 }
 
