@@ -162,3 +162,123 @@ def test_axes_that_line_up_are_named_with_the_cure():
     for text in (str(caught.value), run.message):
         for part in ("'x', 'y', 'z' line up", "gimbal lock", "'f1', 'f2'", "spherical joint"):
             assert part in text
+
+
+def row_of_hinges(count, armature=None):
+    """Hinges in a row about x, y, z in turn, 0.2 m apart, with nothing but a tip that has mass."""
+    builder = lw.ModelBuilder("row")
+    builder.add_link("base")
+    for k in range(count):
+        tip = {"mass": 2.0, "com": (0.1, 0.2, 0.3), "inertia": np.diag([0.03, 0.04, 0.05])}
+        builder.add_link(f"l{k}", **(tip if k == count - 1 else {}))
+        builder.add_joint(
+            *(f"j{k}", "revolute", f"l{k - 1}" if k else "base", f"l{k}"),
+            translation=(0.2, 0.05 * k, 0.1),
+            axis=np.roll((1, 0.1, 0), k),
+            armature=None if armature is None else armature[k],
+        )
+    return builder.build()
+
+
+@pytest.mark.parametrize("count", [7, 9, 14])
+@pytest.mark.parametrize("where", ["all", "inner", "outer", "scattered"])
+def test_rows_of_massless_links_with_armature_run(rng, count, where):
+    """Witness: (J^T M J + armature) du = tau - h, with J of the tip, the only link with mass."""
+    armature = rng.uniform(0.1, 1.0, count)
+    bare = {
+        "all": [],
+        "inner": range(count - 6, count),
+        "outer": range(6),
+        "scattered": range(1, 7),
+    }
+    armature[list(bare[where])] = 0.0  # six degrees of freedom may have none
+    model = row_of_hinges(count, armature)
+    q, v, tau = rng.normal(size=(3, count))
+    tip = lw.body_jacobian(model, q, f"l{count - 1}")
+    c, mass, central = np.array([0.1, 0.2, 0.3]), 2.0, np.diag([0.03, 0.04, 0.05])
+    cross = np.array([[0, -c[2], c[1]], [c[2], 0, -c[0]], [-c[1], c[0], 0]])
+    inertia = np.block(
+        [[mass * np.eye(3), -mass * cross], [mass * cross, central - mass * cross @ cross]]
+    )
+    full = tip.T @ inertia @ tip + np.diag(armature)
+    np.testing.assert_allclose(lw.mass_matrix(model, q), full, atol=1e-12)
+    expected = np.linalg.solve(full, tau - lw.inverse_dynamics(model, q, v, np.zeros(count)))
+    found = lw.forward_dynamics(model, q, v, tau)
+    scale = np.abs(expected).max() * np.linalg.cond(full)
+    np.testing.assert_allclose(found, expected, atol=1e-14 * scale)
+    same = lw.forward_dynamics(model, q, v, tau, method="composite_rigid_body")
+    np.testing.assert_allclose(same, expected, atol=1e-14 * scale)
+    # What goes through a massless link is what its outboard joint passes on.
+    loads = lw.joint_loads(model, q, v, tau)
+    poses = lw.joint_poses(model, q)
+    for k in range(count - 1):
+        force = poses[k + 1, :3, :3] @ loads[k + 1, :3]
+        moment = poses[k + 1, :3, :3] @ loads[k + 1, 3:]
+        moment += np.cross(poses[k + 1, :3, 3] - poses[k, :3, 3], force)
+        np.testing.assert_allclose(poses[k, :3, :3] @ loads[k, :3], force, atol=1e-11 * scale)
+        np.testing.assert_allclose(poses[k, :3, :3] @ loads[k, 3:], moment, atol=1e-11 * scale)
+    with pytest.raises(lw.InputError, match=r"'l\d+'.* articulated_body"):
+        lw.forward_dynamics(model, q, v, tau, method="constraint_force")
+
+
+def test_seven_hinges_without_armature_can_be_looked_at(linkwise, tmp_path):
+    model = row_of_hinges(7)
+    assert lw.link_poses(model, np.zeros(7)).shape == (8, 4, 4)
+    assert len(lw.inverse_dynamics(model, np.zeros(7), np.zeros(7), np.ones(7))) == 7
+    for call in (
+        lambda: lw.forward_dynamics(model, np.zeros(7), np.zeros(7)),
+        lambda: lw.simulate(model, duration=0.1),
+    ):
+        with pytest.raises(lw.InputError, match="more than 6 degrees of freedom") as caught:
+            call()
+        for name in [f"'j{k}'" for k in range(7)] + [f"'l{k}'" for k in range(6)]:
+            assert name in str(caught.value)
+    run = lw.simulate(model, duration=0.01, drives={"j3": lw.Locked()})
+    assert run.outcome == "converged"
+    run = lw.simulate(model.with_joint("j3", armature=0.1), duration=0.01)
+    assert run.outcome == "converged"
+    links = "".join(f'<link name="l{k}"/>' for k in range(7))
+    joints = "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/>'
+        f'<axis xyz="{k % 2} {(k + 1) % 2} 0"/></joint>'
+        for k in range(7)
+    )
+    tip = '<link name="l7"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
+    urdf = tmp_path / "row.urdf"
+    urdf.write_text(
+        f'<robot name="row">{links}{joints}{tip}ixz="0" iyz="0"/></inertial></link></robot>'
+    )
+    found = linkwise("inspect", urdf)
+    assert found.code == 0
+    assert "6 at most are determined" in " ".join(found.out.split())
+
+
+def test_a_floating_base_of_slides_and_hinges_flies_as_a_floating_joint_does():
+    """Three slides and three hinges with massless links between, beside one floating joint."""
+    builder, free = lw.ModelBuilder(), lw.ModelBuilder()
+    body = {"mass": 3.0, "com": (0.1, 0.2, -0.1), "inertia": np.diag([0.2, 0.3, 0.4])}
+    builder.add_link("world")
+    free.add_link("world")
+    free.add_link("body", **body)
+    free.add_joint("free", "floating", "world", "body")
+    names = [f"{kind}{axis}" for kind in ("slide", "turn") for axis in "xyz"]
+    for k, name in enumerate(names):
+        last = name == "turnz"
+        builder.add_link("body" if last else name, **(body if last else {}))
+        kind = "prismatic" if k < 3 else "revolute"
+        parent = names[k - 1] if k else "world"
+        builder.add_joint(f"j{name}", kind, parent, "body" if last else name, axis=np.eye(3)[k % 3])
+    stacked, floating = builder.build(), free.build()
+    rates = [0.3, -0.2, 2.0, 0.5, 0.4, 0.6]  # at zero the hinges' axes are the body's
+    options = {"duration": 0.8, "every": 0.4, "tolerance": 1e-10, "v0": rates}
+    ours, theirs = lw.simulate(stacked, **options), lw.simulate(floating, **options)
+    np.testing.assert_allclose(
+        lw.joint_poses(stacked, ours.position.values)[:, -1],
+        lw.joint_poses(floating, theirs.position.values)[:, 0],
+        atol=1e-8,
+    )
+    with pytest.raises(lw.NumericsError, match=r"some of joints .* line up .* floating joint"):
+        lw.forward_dynamics(stacked, [0, 0, 0, 0, np.pi / 2, 0], np.ones(6))
+    # Armature of one of them lifts the lock.
+    geared = stacked.with_joint("jturnx", armature=1e-3)
+    assert np.isfinite(lw.forward_dynamics(geared, [0, 0, 0, 0, np.pi / 2, 0], np.ones(6))).all()

@@ -4,6 +4,22 @@
 #include <numeric>
 
 namespace linkwise {
+namespace {
+
+/// Stacks what is between masses, from the tips inward, as far as six degrees of freedom go.
+void stack(const MachineGraph& graph, Lumps& lumps) {
+  lumps.stacked.resize(graph.n_links());
+  for (int l = 0; l < graph.n_links(); ++l) lumps.stacked[l] = is_between(lumps, l);
+  std::vector<int> freedom(graph.n_links(), 0);  // by lead: of the stack outboard of it
+  for (auto j = lumps.moving.rbegin(); j != lumps.moving.rend(); ++j) {
+    const auto& joint = graph.joints[*j];
+    const int link = joint.child;
+    if (freedom[link] + joint.freedom > most_stacked) lumps.stacked[link] = 0;
+    freedom[lumps.lead[joint.parent]] = joint.freedom + (lumps.stacked[link] ? freedom[link] : 0);
+  }
+}
+
+}  // namespace
 
 Lumps make_lumps(const MachineGraph& graph, const SpanningForest& forest) {
   Lumps out;
@@ -28,6 +44,7 @@ Lumps make_lumps(const MachineGraph& graph, const SpanningForest& forest) {
   out.light = out.massless;
   for (auto j = out.moving.rbegin(); j != out.moving.rend(); ++j)
     if (!out.light[graph.joints[*j].child]) out.light[out.lead[graph.joints[*j].parent]] = 0;
+  stack(graph, out);
   return out;
 }
 
@@ -41,13 +58,13 @@ BodyTree stack_massless(const MachineGraph& graph, const SpanningForest& forest,
   out.joints.reserve(lumps.moving.size());
   for (int j : lumps.moving) {
     const int link = graph.joints[j].child;
-    if (is_stacked(lumps, link)) continue;
+    if (lumps.stacked[link]) continue;
     const int first = static_cast<int>(out.joints.size());
     int parent = link;  // lead of the lump that the stack so far hangs on
     do {
       out.joints.push_back(moving_of[parent]);
       parent = lumps.lead[graph.joints[forest.inboard[parent]].parent];
-    } while (is_stacked(lumps, parent) && moving_of[parent] >= 0);
+    } while (lumps.stacked[parent] && moving_of[parent] >= 0);
     std::reverse(out.joints.begin() + first, out.joints.end());
     body_of[link] = static_cast<int>(out.bodies.size());
     out.bodies.push_back({link, body_of[parent], first});

@@ -3,13 +3,17 @@
 //
 // Links joined by welds are one lump, named by its lead, the link nearest to the ground. A massless
 // lump between two joints is no body: its inboard joint is stacked with its outboard one, and the
-// two are one connection of the body that follows (docs/theory/model.md).
+// two are one connection of the body that follows (docs/theory/model.md). Where that would have
+// more than six degrees of freedom, a massless lump is a body after all.
 #include <span>
 #include <vector>
 
 #include "linkwise/graph/spanning_forest.hpp"
 
 namespace linkwise {
+
+/// Degrees of freedom that the connection of two bodies can have.
+inline constexpr int most_stacked = 6;
 
 struct Lumps {
   std::vector<int> lead;       ///< by link
@@ -18,6 +22,8 @@ struct Lumps {
   std::vector<char> massless;  ///< by lead
   std::vector<char> light;     ///< by lead: massless, and so is all that hangs on it
   std::vector<int> outboard;   ///< by lead: moving joints and ends of loop joints on it
+  /// By lead: no body of its own, its inboard joint is part of the next body's connection.
+  std::vector<char> stacked;
 };
 
 Lumps make_lumps(const MachineGraph& graph, const SpanningForest& forest);
@@ -46,9 +52,8 @@ inline std::span<const int> joints_of(const BodyTree& tree, int body) {
 BodyTree stack_massless(const MachineGraph& graph, const SpanningForest& forest,
                         const Lumps& lumps);
 
-/// Is a lump not a body of its own, because its inboard joint is part of the next body's
-/// connection?
-inline bool is_stacked(const Lumps& lumps, int lead) {
+/// Has a lump no mass, and one joint outboard that carries some?
+inline bool is_between(const Lumps& lumps, int lead) {
   return lumps.massless[lead] && lumps.outboard[lead] == 1 && !lumps.light[lead];
 }
 

@@ -51,15 +51,18 @@ void check_weld(const Machine& machine, int lead, int child, const std::string& 
                        "' welds it to another link; keep fixed joints, or let the joint move");
 }
 
-/// A lump without mass may carry one joint, or several in the recursion. What hangs on a light one
-/// is find_undetermined's business.
-void check_massless(const Machine& machine, const Lumps& lumps, std::vector<Note>& notes) {
+/// A lump without mass that is a body carries several joints, or a stack of six degrees of freedom.
+/// What hangs on a light one is find_undetermined's business.
+void note_massless(const Machine& machine, const Lumps& lumps, std::vector<Note>& notes) {
   for (int j : lumps.moving) {
     const int l = machine.graph.joints[j].child;
-    if (!lumps.massless[l] || lumps.light[l] || lumps.outboard[l] == 1) continue;
-    notes.push_back({NoteLevel::warning, machine.link_name(l),
-                     "has no mass and carries several joints; method constraint_force cannot "
-                     "take it, articulated_body can"});
+    if (!lumps.massless[l] || lumps.light[l] || lumps.stacked[l]) continue;
+    notes.push_back(
+        {NoteLevel::warning, machine.link_name(l),
+         std::string("has no mass and ") +
+             (lumps.outboard[l] == 1 ? "joints on both sides with more than 6 degrees of freedom"
+                                     : "carries several joints") +
+             "; method constraint_force cannot take it, articulated_body can"});
   }
 }
 
@@ -96,7 +99,7 @@ LumpedInertia lump_inertia(const Machine& machine, const Lumps& lumps, std::vect
   if (!spec.floating_base) out.moving_mass -= out.inertia[machine.graph.ground].m;
   for (int l = 0; l < machine.n_links(); ++l)
     check_inertia(machine, l, lumps.lead[l] != l, out.inertia[lumps.lead[l]], notes);
-  check_massless(machine, lumps, notes);
+  note_massless(machine, lumps, notes);
   return out;
 }
 

@@ -7,19 +7,10 @@
 namespace linkwise {
 namespace {
 
-void check_stack(const Machine& machine, const PlacedJoints& placed, std::span<const int> stack,
-                 int nv, std::vector<Note>& notes) {
-  const auto link = [&](int joint) { return machine.link_name(placed.joints[joint].link); };
-  if (nv > 6) {
-    std::string names;
-    for (int i : stack.first(stack.size() - 1)) names += (names.empty() ? "'" : "', '") + link(i);
-    throw InputError("links " + names + "'" + machine.where + " have no mass and leave " +
-                     std::to_string(nv) + " degrees of freedom between '" + link(stack.back()) +
-                     "' and the next inboard mass (6 at most); give one of them a mass and an "
-                     "inertia");
-  }
+void note_stack(const Machine& machine, const PlacedJoints& placed, std::span<const int> stack,
+                std::vector<Note>& notes) {
   for (size_t k = 0; k + 1 < stack.size(); ++k)
-    notes.push_back({NoteLevel::merge, link(stack[k]),
+    notes.push_back({NoteLevel::merge, machine.link_name(placed.joints[stack[k]].link),
                      "has no mass: joint '" + placed.joints[stack[k]].name + "' is stacked with '" +
                          placed.joints[stack[k + 1]].name + "'"});
 }
@@ -80,7 +71,7 @@ Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const Bo
       body.nv += joint.nv;
       body.n_elements += joint.n_elements;
     }
-    check_stack(machine, placed, stack, body.nv, notes);
+    note_stack(machine, placed, stack, notes);
     set_body(machine.spec.links[given.link], lumped.inertia[given.link],
              placed.joints[stack.back()].to_user, out, b);
     constants.tree = placed.elements[body.first_element + body.n_elements - 1].placement;

@@ -12,8 +12,7 @@ struct Bodies {
   int singular = -1;  ///< the first whose inertia is singular, -1: none
 };
 
-/// Bodies from the tree, and in `placed` which joint belongs to which. Throws InputError where
-/// massless links leave more than six degrees of freedom between two bodies.
+/// Bodies from the tree, and in `placed` which joint belongs to which.
 Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const BodyTree& tree,
                    PlacedJoints& placed, std::vector<Note>& notes);
 

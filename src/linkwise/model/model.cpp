@@ -119,16 +119,23 @@ std::string Model::body_name(int body) const {
 std::string Model::lined_up(int body) const {
   if (topology[body].nv < 2) return "";
   std::string in_line, massless;
-  int count = 0;
+  int count = 0, sliding = 0;
   for (const JointInfo& j : joints) {
     if (j.body != body) continue;
     in_line += (count++ ? ", '" : "'") + j.name + "'";
     if (!j.last_of_body) massless += (massless.empty() ? "'" : ", '") + links[j.link].name + "'";
+    for (int k = 0; k < j.n_elements; ++k)
+      sliding += elements[j.first_element + k].kind == ElementKind::prismatic;
   }
   if (count < 2) return "";
-  return "joints " + in_line + " line up here (gimbal lock) and links " + massless +
-         " between them have no mass: give those links mass and inertia, keep away from this "
-         "position, or make one spherical joint of the joints";
+  const char* instead = "leave one of the joints out";
+  if (sliding == 0 && topology[body].nv == 3) instead = "make one spherical joint of the joints";
+  if (sliding > 0 && topology[body].nv == 6) instead = "make one floating joint of the joints";
+  return (sliding ? "some of joints " : "joints ") + in_line +
+         " line up here (gimbal lock) and links " + massless +
+         " between them have no mass: give those links mass and inertia or the joints armature, "
+         "keep away from this position, or " +
+         instead;
 }
 
 const JointSpec& Model::joint_spec(int joint) const {

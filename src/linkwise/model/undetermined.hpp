@@ -14,7 +14,8 @@ namespace linkwise {
 ///
 /// A joint is one of them if all that hangs on it is massless, or if it ends in a single body
 /// without inertia about an axis that the joint turns; unless it has armature, or its motion is
-/// given.
+/// given. So are joints in a row with massless links between them and more than six degrees of
+/// freedom that have none.
 std::string find_undetermined(const Machine& machine, const Lumps& lumps,
                               const LumpedInertia& lumped, std::vector<Note>& notes);
 

@@ -157,6 +157,22 @@ TEST(BodyTree, WeldedLinksAreOneLumpAndMasslessOnesNoBodies) {
   EXPECT_EQ(tree.bodies[2].parent, 0);
 }
 
+TEST(BodyTree, AMasslessLinkIsABodyWhereSixDegreesOfFreedomFollow) {
+  // ground - 1 - ... - 8 - 9, of which only 9 has mass. From the tip inward 1 + 1 + 3 degrees of
+  // freedom end at 6, where 2 more would be 7, and 2 + 1 + 1 + 1 + 1 at 1.
+  MachineGraph graph =
+      graph_of(10, {{0, 1}, {1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 6, 2}, {6, 7, 3}, {7, 8}, {8, 9}});
+  for (int l = 1; l < 9; ++l) graph.massless[l] = 1;
+  const SpanningForest forest = make_spanning_forest(graph);
+  const BodyTree tree = stack_massless(graph, forest, make_lumps(graph, forest));
+  ASSERT_EQ(tree.bodies.size(), 3u);
+  for (int b = 0; b < 3; ++b) {
+    EXPECT_EQ(tree.bodies[b].link, (Indices{1, 6, 9})[b]);
+    EXPECT_EQ(tree.bodies[b].parent, b - 1);
+    EXPECT_EQ(joints_of(tree, b).size(), (std::vector<size_t>{1, 5, 3})[b]);
+  }
+}
+
 TEST(BodyTree, AMasslessLinkWithTheEndOfALoopStaysABody) {
   // ground - 1 (massless) - 2, and a loop joint between 1 and 3, which hangs on the ground.
   MachineGraph graph = graph_of(4, {{0, 1, 1, true}, {1, 2, 1, true}, {0, 3, 1, true}, {1, 3}});
@@ -164,7 +180,7 @@ TEST(BodyTree, AMasslessLinkWithTheEndOfALoopStaysABody) {
   const SpanningForest forest = make_spanning_forest(graph);
   EXPECT_EQ(forest.loop_joints, Indices{3});
   const Lumps lumps = make_lumps(graph, forest);
-  EXPECT_FALSE(is_stacked(lumps, 1));
+  EXPECT_FALSE(lumps.stacked[1]);
   EXPECT_EQ(stack_massless(graph, forest, lumps).bodies.size(), 3u);
 }
 

@@ -76,13 +76,6 @@ const Wrong wrong_links[] = {
      "model 'arm' of arm.urdf has no links; add at least one"},
     {"gravity_not_a_number", [](ModelSpec& s) { s.gravity.y = nan; },
      "model 'arm' of arm.urdf: gravity is not finite; give three finite numbers in m/s2"},
-    {"stack_too_free",
-     [](ModelSpec& s) {
-       s.links[1] = {"upper", 0, {}, {}};
-       s.joints[0].type = JointType::floating;
-     },
-     "links 'upper' of arm.urdf have no mass and leave 9 degrees of freedom between 'lower' and "
-     "the next inboard mass (6 at most); give one of them a mass and an inertia"},
 };
 
 const Wrong wrong_joints[] = {
