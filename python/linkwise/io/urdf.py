@@ -19,6 +19,7 @@ from linkwise._core import InputError, Model, ModelBuilder
 from linkwise.base import Array
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.urdf_elements import UrdfElement
+from linkwise.io.urdf_transmissions import Transmissions
 from linkwise.io.urdf_vocabulary import ATTRIBUTES, Vocabulary
 from linkwise.io.xml import is_foreign, local_name
 
@@ -69,6 +70,7 @@ def read_urdf(
     for link in reader.links:
         reader.add_link(builder, link)
     joints = [reader.joint(element) for element in reader.joints]
+    reader.add_rotors(joints, root)
     for joint in depth_first(joints) if joint_order == "pinocchio" else joints:
         builder.add_joint(joint.name, joint.type, joint.parent, joint.child, **joint.properties)
     reader.note_units(joints)
@@ -269,6 +271,14 @@ class _Reader:
                 'let it move on its own with mimic="independent", or remove <mimic>',
             )
         self._mimics[name] = target
+
+    def add_rotors(self, joints: list[UrdfJoint], root: etree._Element) -> None:
+        """Gives joints the rotors of their transmissions, and notes them."""
+        rotors = Transmissions(self.path, root, {joint.name: joint.type for joint in joints})
+        for joint in joints:
+            if joint.name in rotors.armature:
+                joint.properties["armature"] = rotors.armature[joint.name]
+        self.notes += rotors.notes()
 
     def note_units(self, joints: list[UrdfJoint]) -> None:
         """Warn of inertias that no body of the link's size can have: units, or a default of 1."""

@@ -141,7 +141,7 @@ class Vocabulary:
             self._harmless[f"<{shorten(tag)}>"] += 1
         elif tag in ("link", "joint"):
             self._inside(element, f"{tag} '{shorten(element.get('name', ''))}'")
-        elif tag == "material":
+        elif tag in ("material", "transmission"):  # urdf_transmissions reads the latter
             pass
         elif tag in _MACROS:
             self._refuse_macro(element)

@@ -131,7 +131,7 @@ def test_what_is_ignored_is_noted(arm):
         )
     )
     ignored = {n.element: n.text for n in lw.load(arm).notes if n.level == "info"}
-    assert ignored["<transmission>"].startswith("2 ignored")
+    assert ignored["<transmission>"] == "2 without a motor's inertia: nothing of them acts"
     assert ignored["<gazebo>"].startswith("1 ignored")
     assert ignored["<camera>"].startswith("1 ignored")
     assert "<material>" not in ignored
