@@ -19,7 +19,7 @@ import numpy as np
 from linkwise._core import InputError, Model, ModelBuilder
 from linkwise.base import Array
 from linkwise.io.complaint import complain, file_name, shorten
-from linkwise.io.mjcf_transmissions import Transmissions
+from linkwise.io.mjcf_transmissions import Transmissions, without_warnings
 
 KINDS = ("floating", "spherical", "prismatic", "revolute")
 """Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
@@ -71,14 +71,12 @@ def compile_mjcf(path: str | os.PathLike[str], xml: str | None = None) -> Any:
     if file_name(path) != os.fspath(path):
         problem = "its name is not UTF-8, which MuJoCo cannot open"
         complain(path, "model file", problem, "rename it")
-    # Without a handler MuJoCo prints warnings and appends them to a file in the working directory.
-    previous = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
     try:
-        if xml is None:
-            mj_model = mujoco.MjModel.from_xml_path(os.fspath(path))
-        else:
-            mj_model = mujoco.MjModel.from_xml_string(xml)
+        with without_warnings():
+            if xml is None:
+                mj_model = mujoco.MjModel.from_xml_path(os.fspath(path))
+            else:
+                mj_model = mujoco.MjModel.from_xml_string(xml)
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         complain(
             path,
@@ -86,8 +84,6 @@ def compile_mjcf(path: str | os.PathLike[str], xml: str | None = None) -> Any:
             f"MuJoCo refuses it: {shorten(error, 300)}",
             "correct the element that it names",
         )
-    finally:
-        mujoco.set_mju_user_warning(previous)
     names = Names(mj_model)
     for field in ("body_pos", "body_quat", "body_mass", "body_ipos", "body_iquat", "body_inertia"):
         wrong = np.flatnonzero(~np.isfinite(getattr(mj_model, field)).reshape(mj_model.nbody, -1))

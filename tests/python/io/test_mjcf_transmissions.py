@@ -116,3 +116,31 @@ def test_what_couples_joints_is_a_warning(tmp_path, tendon, actuator, element, e
     notes = [note for note in lw.load(path).notes if note.element == element]
     assert [note.level for note in notes] == ["warning"]
     assert expected in notes[0].text
+
+
+def test_the_warning_says_how_much_is_left_out(tmp_path):
+    """Beside MuJoCo's mass matrix with and without: what the joint with the largest share lacks."""
+    tendon = f'<fixed name="t" armature=".7" damping=".2" frictionloss=".1" stiffness="2">{TWO}'
+    tendon += '</fixed><spatial name="s" armature=".2"><site site="s"/><site site="o"/></spatial>'
+    actuator = '<motor name="m" tendon="t" gear="2" armature=".5"/>'
+    path = tmp_path / "machine.xml"
+    text = MACHINE.replace("<worldbody>", '<worldbody><site name="o" pos="0 0 1"/>')
+    path.write_text(text.format(tendon=tendon, actuator=actuator))
+    notes = {note.element: note.text for note in lw.load(path).notes}
+    matrices = {}
+    for case in ("", "t", "s", "m"):
+        mj_model = mujoco.MjModel.from_xml_path(str(path))
+        for k, name in enumerate("ts"):
+            mj_model.tendon_armature[k] *= case == name
+        mj_model.actuator_armature[:] *= case == "m"
+        data = mujoco.MjData(mj_model)
+        mujoco.mj_forward(mj_model, data)
+        matrices[case] = np.diag(mass_matrix(mj_model, data))
+    plain = matrices[""]
+    for case, element in (("t", "tendon 't'"), ("s", "tendon 's'"), ("m", "actuator 'm'")):
+        added = matrices[case] - plain
+        most = int(added.argmax())
+        joint, unit = (("h", "kg m2"), ("k", "kg"), *[("b", "kg m2")] * 3)[most]
+        said = f"at joint '{joint}' armature {added[most]:.3g} {unit} beside {plain[most]:.3g}"
+        assert said in notes[element]
+    assert ", damper 1.8 N s/m, friction 0.3 N, spring 18 N/m" in notes["tendon 't'"]
