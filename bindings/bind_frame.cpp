@@ -79,12 +79,12 @@ size_t hash(const Frame& frame) {
 nb::object matrix(const Mat3<double>& m) {
   NewArray out({3}, {3});
   std::copy(m.m, m.m + 9, out.data);
-  return out.array;
+  return read_only(out.array);
 }
 
 nb::object origin_of(const Frame& frame) {
   const Vec3<double>& r = frame.placement.r;
-  return nb::cast(to_numpy({r.x, r.y, r.z}));
+  return read_only(to_numpy({r.x, r.y, r.z}));
 }
 
 nb::tuple placement_of(const PyModel& self, nb::handle value) {
@@ -93,7 +93,8 @@ nb::tuple placement_of(const PyModel& self, nb::handle value) {
                               ? nb::none()
                               : nb::cast(self.model->links[self.model->joints[at.joint].link].name);
   const Vec3<double>& r = at.placement.r;
-  return nb::make_tuple(body, matrix(transpose(at.placement.R)), to_numpy({r.x, r.y, r.z}));
+  return nb::make_tuple(body, matrix(transpose(at.placement.R)),
+                        read_only(to_numpy({r.x, r.y, r.z})));
 }
 
 }  // namespace

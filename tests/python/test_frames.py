@@ -272,3 +272,28 @@ def test_loads_of_a_state_under_a_wrench_at_the_tip(leg):
 def test_wrenches_of_a_state_that_are_refused(leg, push, message):
     with pytest.raises(lw.InputError, match=message):
         lw.external_wrenches(leg, POSE, push)
+
+
+def test_a_wrench_on_a_link_without_mass_between_joints_is_refused():
+    """No body would get it: it would be left out without a word."""
+    builder = lw.ModelBuilder("universal")
+    builder.add_link("ground")
+    builder.add_link("cross")
+    builder.add_link("bob", mass=1, com=(0, 0, -1), inertia=0.1 * np.eye(3))
+    builder.add_joint("first", "revolute", "ground", "cross", axis=(1, 0, 0))
+    builder.add_joint("second", "revolute", "cross", "bob", axis=(0, 1, 0))
+    model = builder.build()
+    q = np.zeros(2)
+    outside = lw.external_wrenches(model, q, {"cross": [0, 1, 0, 0, 0, 0]})
+    for call in (lw.joint_loads, lw.forward_dynamics):
+        with pytest.raises(lw.InputError, match="link 'cross' between two joints has no mass"):
+            call(model, q, q, q, external=outside)
+    with pytest.raises(lw.InputError, match="'cross' has no mass, so no wrench can act on it"):
+        lw.simulate(model, duration=0.1, wrenches={"cross": [0, 1, 0, 0, 0, 0]})
+    assert lw.joint_loads(model, q, q, q, external=np.zeros((2, 6))).shape == (2, 6)
+
+
+def test_what_describes_a_frame_is_read_only(leg):
+    for array in (TIP.origin, TIP.axes, *leg.frame_placement(TIP)[1:]):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1

@@ -134,16 +134,16 @@ def test_a_sensor_behind_a_link_without_mass_has_its_load(tmp_path, mount):
 def test_messages_say_merged(tmp_path):
     path = tmp_path / "wrist.urdf"
     path.write_text(SENSOR.format(mount="fixed"))
-    with pytest.raises(lw.InputError, match=r"'ft' .* merged; load with keep_fixed"):
+    with pytest.raises(lw.InputError, match=r"'ft' .* merged; .* load with keep_fixed"):
         lw.load(path).joint_index("ft")
-    with pytest.raises(lw.InputError, match=r"'tcp' .* merged: nothing on it has mass"):
+    with pytest.raises(lw.InputError, match=r"'tcp' .* merged, because nothing on it has mass"):
         lw.load(path, keep_fixed=True).joint_index("tcp")
     scenario = tmp_path / "s.toml"
     scenario.write_text(
         'model = "wrist.urdf"\n[output]\njoints = ["ft"]\n[simulate]\nduration = 1\n'
     )
     read = lw.load_scenario(scenario)
-    with pytest.raises(lw.InputError, match="merged; load with keep_fixed"):
+    with pytest.raises(lw.InputError, match="merged; .* load with keep_fixed"):
         read.simulate_arguments(read.load_model())
 
 

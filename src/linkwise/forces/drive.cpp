@@ -131,9 +131,13 @@ void add_wrenches(const Model&, const std::vector<Wrench>& wrenches, double t, c
     Force<double> f{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
     if (wrench.world) {
       const double* pose = poses + 16 * wrench.joint;
-      const Mat3<double> R{
-          {pose[0], pose[1], pose[2], pose[4], pose[5], pose[6], pose[8], pose[9], pose[10]}};
-      f = {transpose_times(R, f.lin), transpose_times(R, f.ang)};
+      double turned[6] = {};
+      for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k) {
+          turned[i] += pose[4 * k + i] * w[k];
+          turned[3 + i] += pose[4 * k + i] * w[3 + k];
+        }
+      f = {{turned[0], turned[1], turned[2]}, {turned[3], turned[4], turned[5]}};
       f.ang += cross(wrench.placement.r, f.lin);
     } else {
       f = transpose_times(wrench.placement, f);

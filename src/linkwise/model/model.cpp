@@ -75,9 +75,9 @@ int Model::joint_index(const std::string& name) const {
       throw InputError(
           "joint '" + name + "'" + where() + " is fixed and its links are merged" +
           (spec_.keep_fixed
-               ? ": nothing on it has mass, so it carries no load; give a link on it mass"
-               : "; load with keep_fixed (keep_fixed = true in a scenario) to have "
-                 "its load"));
+               ? ", because nothing on it has mass; its load is in lw.loads.in_frame"
+               : "; its load is in lw.loads.in_frame (linkwise loads --at child -j), or load with "
+                 "keep_fixed (keep_fixed = true in a scenario)"));
   std::vector<std::string> known;
   for (const auto& j : joints) known.push_back(j.name);
   throw InputError("joint '" + name + "' does not exist in model '" + spec_.name + "'" + where() +

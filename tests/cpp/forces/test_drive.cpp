@@ -169,5 +169,37 @@ TEST(Wrenches, AreTurnedIntoTheirBodiesAndAddUp) {
     }
 }
 
+/// At a point of the world the wrench has its components there, and an arm to the joint's origin.
+TEST(Wrenches, AtAPlacedFrameHaveAnArmToTheirJoint) {
+  const Model model = three_joints();
+  Draws draws(89);
+  std::vector<double> poses(48);
+  const Mat3<double> R = random_rotation(draws);  // joint frame -> world
+  const Vec3<double> origin = random_vector3(draws);
+  const double at[3] = {origin.x, origin.y, origin.z};
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) poses[16 + 4 * i + k] = R.m[3 * i + k];
+    poses[16 + 4 * i + 3] = at[i];
+  }
+  Wrench wrench;
+  wrench.joint = 1;
+  wrench.value = random_values(6, draws);
+  wrench.placement = {random_rotation(draws), random_vector3(draws)};
+  const Vec3<double> point = origin + R * wrench.placement.r;
+  const Values& w = wrench.value;
+  for (const bool world : {true, false}) {
+    wrench.world = world;
+    const Mat3<double> own = R * transpose(wrench.placement.R);  // frame -> world
+    Vec3<double> f{w[0], w[1], w[2]}, n{w[3], w[4], w[5]};
+    if (!world) f = own * f, n = own * n;
+    const Vec3<double> force = transpose_times(R, f),
+                       moment = transpose_times(R, n + cross(point - origin, f));
+    const Values expected{force.x, force.y, force.z, moment.x, moment.y, moment.z};
+    Values external(18);
+    add_wrenches(model, {wrench}, 0, poses.data(), external.data());
+    for (int i = 0; i < 6; ++i) EXPECT_NEAR(external[6 + i], expected[i], 1e-14);
+  }
+}
+
 }  // namespace
 }  // namespace linkwise::testing
