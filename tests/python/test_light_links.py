@@ -143,7 +143,7 @@ def test_messages_say_merged(tmp_path):
         'model = "wrist.urdf"\n[output]\njoints = ["ft"]\n[simulate]\nduration = 1\n'
     )
     read = lw.load_scenario(scenario)
-    with pytest.raises(lw.InputError, match="merged; .* load with keep_fixed"):
+    with pytest.raises(lw.InputError, match=r"merged; .* load with keep_fixed"):
         read.simulate_arguments(read.load_model())
 
 
