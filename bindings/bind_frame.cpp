@@ -149,7 +149,7 @@ Raises:
           "link", [](const Frame& f) { return f.link; }, "The name of the link that carries it.")
       .def_prop_ro("origin", &origin_of, "Its origin (3,) [m], in the link's frame.")
       .def_prop_ro(
-          "axes", [](const Frame& f) { return matrix(transpose(f.placement.R)); },
+          "axes", [](const Frame& f) { return read_only(matrix(transpose(f.placement.R))); },
           "Its axes (3, 3) [unit vectors] as columns, in the link's frame.")
       .def("__repr__", [](const Frame& f) { return printable(frame_text(f)); })
       .def("__eq__",

@@ -160,7 +160,8 @@ def test_every_array_of_the_core_is_read_only(winch):
     """Those that are not named above: what a property returns would be written into a copy."""
     system = lw.ConstraintSystem(winch, [0, 0], [0, 0], [0, 0])
     method = lw.DynamicsMethod(winch)
-    for owner in (winch, system, method):
+    frame = lw.Frame("hook", origin=(0, 0, 1))
+    for owner in (winch, system, method, frame):
         for name in dir(type(owner)):
             if isinstance(getattr(type(owner), name), property):
                 value = getattr(owner, name)
@@ -254,3 +255,24 @@ def test_properties_may_be_swept(urdf):
 def test_what_a_scenario_gets_wrong_is_named_with_its_key(urdf, line, complaint):
     with pytest.raises(lw.InputError, match=complaint):
         read(urdf, f'model = "winch.urdf"\n{line}\n[simulate]\nduration = 1\n').load_model()
+
+
+def test_machines_of_a_batch_keep_their_own_properties(winch):
+    """Models of one batch differ by armature, damping, spring and stop: each moves as it does
+    alone."""
+    rope = {"lower": -0.01, "upper": 0.02, "limit_stiffness": 500.0, "limit_damping": 0.1}
+    models = [
+        winch,
+        winch.with_joint("shaft", armature=3.0),
+        winch.with_joint("shaft", damping=5.0, friction=0.2),
+        winch.with_joints({"shaft": {"stiffness": 40.0, "rest_position": 0.3}, "rope": rope}),
+    ]
+    options = {
+        **{"duration": 0.1, "step": 1e-3, "every": 0.1, "integrator": "runge_kutta_4"},
+        **{"v0": [1.0, 0.2], "drives": {"shaft": 2.0}},
+    }
+    found = lw.simulate_batch(models, **options).position.isel(time=-1).values.reshape(4, 2)
+    for model, ours in zip(models, found, strict=True):
+        alone = lw.simulate(model, **options).position.isel(time=-1).values
+        np.testing.assert_allclose(ours, alone, rtol=1e-9)
+    assert len({tuple(row) for row in found.round(6)}) == 4
