@@ -37,18 +37,21 @@ nb::tuple simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, n
                      " simulations; give each simulation the same number of rows");
   const Start start{rows_of(q, members), rows_of(v, members), rows_of(torque, members), members};
   const Columns columns(m, {members, n}, quantities);
+  const bool keep = !all[0]->directions().empty();
+  const NewArray extremes({members}, {keep ? Extremes::size(m) : 0});
   const Executor executor = executor_for(whole_number(threads, "threads"));
   Interrupt interrupt;
   std::vector<Ending> endings;
   {
     const GilReleased released;
-    endings = simulate_batch(all, start, {times.data, n}, columns.sample, executor,
-                             [&interrupt] { return !interrupt(); });
+    endings = simulate_batch(
+        all, start, {times.data, n}, columns.sample, executor,
+        [&interrupt] { return !interrupt(); }, keep ? extremes.data : nullptr);
   }
   const bool interrupted = interrupt.was_keyboard();
   nb::list ends;
   for (Ending& ending : endings) ends.append(nb::cast(std::move(ending)));
-  return nb::make_tuple(columns.to_python(members), ends, interrupted);
+  return nb::make_tuple(columns.to_python(members), extremes.array, ends, interrupted);
 }
 
 }  // namespace
@@ -58,7 +61,8 @@ void bind_batch_simulation(nb::module_& m) {
         "tau"_a.none(), "times"_a, "quantities"_a, "threads"_a = nb::none(),
         "The loop behind linkwise.simulate_batch: rows (member, ...), members of one simulation "
         "next to each other.\n"
-        "(arrays by name, endings, interrupted by Ctrl-C).");
+        "(arrays by name, extremes (member, ...) where the simulations keep them, endings, "
+        "interrupted by Ctrl-C).");
 }
 
 }  // namespace linkwise::bindings

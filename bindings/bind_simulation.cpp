@@ -190,6 +190,12 @@ void bind_simulation(nb::module_& m) {
            "The samples at times [s], which increase: a dictionary of the time and of the arrays "
            "(time, ...) of\n"
            "the wanted quantities. Fewer where the simulation ends before: see ending.")
+      .def("keep_extremes", &PySimulation::keep_extremes, "directions"_a,
+           "From the next start on, keep the extremes between samples; directions of the joints' "
+           "axes (joint, 3) in the joint frames, NaN where there is no single one.")
+      .def("extremes", &PySimulation::extremes,
+           "What was found until the last time advanced to, as one flat array: see the core's "
+           "Extremes::size.")
       .def_prop_ro("ending", [](const PySimulation& s) { return s.simulation.ending(); })
       .def(
           "interrupt", [](PySimulation& s) { s.simulation.stop(Outcome::interrupted); },

@@ -256,6 +256,26 @@ void PySimulation::wrench_callable(nb::handle at, nb::callable fn, const std::st
   simulation.add_wrench(std::move(w));
 }
 
+void PySimulation::keep_extremes(nb::handle directions) {
+  const size_t n = static_cast<size_t>(model->n_joints());
+  const ArrayIn rows = as_array(directions, "directions");
+  if (rows.ndim() != 2 || rows.shape(0) != n || rows.shape(1) != 3)
+    throw InputError("directions has shape " + shape_text(shape_of(rows)) + "; give shape (" +
+                     std::to_string(n) + ", 3)");
+  simulation.keep_extremes({rows.data(), rows.data() + rows.size()});
+}
+
+nb::object PySimulation::extremes() {
+  if (!simulation.keeps_extremes())
+    throw InputError("no extremes are kept; call keep_extremes before start");
+  std::vector<double> found;
+  {
+    const GilReleased released;  // functions of the caller's may be asked
+    found = simulation.extremes();
+  }
+  return to_numpy(found);
+}
+
 void PySimulation::start(double t0, nb::handle q, nb::handle v) {
   const Argument q0("q0", {static_cast<size_t>(model->nq())}, q),
       v0("v0", {static_cast<size_t>(model->nv())}, v);

@@ -35,6 +35,8 @@ class PySimulation {
                     const std::string& interpolation, const std::string& frame);
   void wrench_callable(nb::handle at, nb::callable fn, const std::string& frame,
                        nb::handle breakpoints, nb::handle samples);
+  void keep_extremes(nb::handle directions);
+  nb::object extremes();
   void start(double t0, nb::handle q, nb::handle v);
 
   /// The garbage collector's: a user's function may refer to its own simulation, by the traceback

@@ -29,8 +29,8 @@ TARGETS: tuple[str, ...]
 
 # Parameters that a binding takes as a Python object, by their name.
 ARRAYS = (
-    "acceleration axes axis breakpoints com external f gravity guess inertia initial origin "
-    "prescribed q q0 rotation target tau times translation v v0 value values"
+    "acceleration axes axis breakpoints com directions external f gravity guess inertia initial "
+    "origin prescribed q q0 rotation target tau times translation v v0 value values"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "arg": "Any",  # without a name: what pickling has kept
@@ -84,7 +84,7 @@ RETURNS = {
     "methods": "list[dict[str, Any]]",
     "numerics": "list[dict[str, Any]]",
     "quantities": "list[dict[str, Any]]",
-    "simulate_members": "tuple[dict[str, Any], list[Ending], bool]",
+    "simulate_members": "tuple[dict[str, Any], Array, list[Ending], bool]",
     "solver_options": "list[dict[str, Any]]",
     "solvers": "list[dict[str, Any]]",
     "stop_rules": "list[dict[str, str]]",

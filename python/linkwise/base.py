@@ -16,6 +16,9 @@ AnyArray = npt.NDArray[Any]
 COMPONENTS = ("fx", "fy", "fz", "nx", "ny", "nz")
 HALVES = (("force", "N", COMPONENTS[:3]), ("moment", "N m", COMPONENTS[3:]))
 
+# What bearings and gears carry, in the order in which the core keeps the extremes.
+DERIVED = ("force", "axial", "radial", "moment", "tilting_moment", "torque", "drive_power")
+
 # What is held of a run at once, in bytes: the run itself may be larger than memory.
 BLOCK_BYTES = 64 << 20
 

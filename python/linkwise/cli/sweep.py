@@ -81,6 +81,8 @@ def member_records(found: xr.Dataset, keys: list[str]) -> list[dict[str, Any]]:
     import numpy as np
 
     from linkwise.base import HALVES, lengths
+    from linkwise.loads.extremes import extremes_of, quantity_rows
+    from linkwise.results import Run
 
     records = []
     for k in range(found.sizes["member"]):
@@ -92,10 +94,14 @@ def member_records(found: xr.Dataset, keys: list[str]) -> list[dict[str, Any]]:
                 continue
             load = member["joint_load"].sel(component=list(components))
             size = lengths(load.transpose("time", "joint", "component").values)
-            at = np.unravel_index(int(np.nanargmax(size)), size.shape)
+            peaks = np.fmax.reduce(size, axis=0)
+            between = extremes_of(Run(member), "quantity")
+            if between is not None:
+                peaks = np.fmax(peaks, between.maximum[quantity_rows([half])[0]])
+            at = int(np.nanargmax(peaks))
             record |= {
-                f"largest_{half}": float(size[at]),
-                f"{half}_joint": str(found["joint"].values[at[1]]),
+                f"largest_{half}": float(peaks[at]),
+                f"{half}_joint": str(found["joint"].values[at]),
             }
         records.append(record)
     return records

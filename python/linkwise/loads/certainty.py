@@ -18,8 +18,9 @@ import numpy as np
 
 from linkwise import _core
 from linkwise._core import InputError
-from linkwise.base import Array, lengths
+from linkwise.base import AnyArray, Array, lengths
 from linkwise.loads.engineering import derive, derived_rows, joint_directions
+from linkwise.loads.extremes import extremes_of, quantity_rows
 from linkwise.loads.peaks import summary
 from linkwise.loads.samples import (
     blocks,
@@ -42,6 +43,8 @@ if TYPE_CHECKING:
 TIGHTER = 100.0
 # The distance of two runs understates the error where both err alike: what is stated is twice it.
 SAFETY = 2.0
+# A step is given a tenth of a run's tolerance.
+STEPS_SHARE = 0.1
 # Rounding of the wrench recursion, relative to the largest load of the sample.
 _ROUNDING = 64 * np.finfo(np.float64).eps
 
@@ -105,16 +108,57 @@ def _check_tighter(run: RunLike, tighter: RunLike) -> None:
         )
 
 
+class _BetweenSamples:
+    """The extremes of two runs between their samples, each with the largest distance (quantity,
+    joint) that the runs have had at samples until the next one after it."""
+
+    def __init__(self, run: RunLike, tighter: RunLike, names: list[str]) -> None:
+        which, times = quantity_rows(names), run.dataset["time"].values
+        both = extremes_of(run, "quantity"), extremes_of(tighter, "quantity")
+        self.peak = np.zeros((len(names), len(joint_names(run))))
+        self._found: list[tuple[Array, Array]] = []  # values, distances to the other run's extreme
+        self._after: list[AnyArray] = []
+        if both[0] is None or both[1] is None:
+            return
+        self.peak = np.nan_to_num(np.abs(both[0].largest[0][which]))
+        for one, other in (both, both[::-1]):
+            assert one is not None
+            assert other is not None
+            for value, when, twin in (
+                (one.minimum, one.minimum_time, other.minimum),
+                (one.maximum, one.maximum_time, other.maximum),
+            ):
+                self._found.append((value[which], np.abs(value - twin)[which]))
+                self._after.append(np.searchsorted(times, when[which]).clip(max=times.size - 1))
+
+    def add(self, k: int, where: slice, running: Array) -> None:
+        """The distances of quantity k until each sample (time, joint) of one block."""
+        for (_, apart), after in zip(self._found, self._after, strict=True):
+            joints = np.flatnonzero((after[k] >= where.start) & (after[k] < where.stop))
+            until = running[after[k, joints] - where.start, joints]
+            apart[k, joints] = np.fmax(apart[k, joints], until)
+
+    def reach(self) -> Array:
+        """No true extreme is higher."""
+        reach = np.zeros_like(self.peak)
+        for value, apart in self._found:
+            reach = np.fmax(reach, np.abs(value) + SAFETY * apart)
+        return reach
+
+
 def _integration(run: RunLike, tighter: RunLike, model: Model, names: list[str]) -> Array:
     """Error bound (quantity, joint) of the peaks.
 
     At every time the truth is taken to be within SAFETY times the largest distance that the two
-    runs have had until then (at one time alone they may be close by chance). So no true peak,
-    whenever it comes, is higher than the largest of all the values with this added.
+    runs have had until then (at one time alone they may be close by chance), of which the distance
+    of their extremes between samples is one. So no true peak, whenever it comes, is higher than the
+    largest of all the values with this added. And no run vouches for less than its own tolerance:
+    where a method's stability makes the steps, a tighter one moves both runs little.
     """
     found = select(run, model)
     directions = joint_directions(model)[found.joints]
-    peak = np.zeros((len(names), found.joints.size))
+    between = _BetweenSamples(run, tighter, names)
+    peak = between.peak.copy()
     reach, largest = np.zeros_like(peak), np.zeros_like(peak)
     for where in blocks(run, 8 * 40 * found.joints.size):
         first = derived_rows(run, found, directions, where)
@@ -123,10 +167,12 @@ def _integration(run: RunLike, tighter: RunLike, model: Model, names: list[str])
             distance = np.abs(first[name] - second[name])
             running = np.maximum.accumulate(np.vstack([largest[k], distance]), axis=0)[1:]
             largest[k] = running[-1]
+            between.add(k, where, running)
             size = np.abs(first[name])
             peak[k] = np.fmax(peak[k], size.max(axis=0))
             reach[k] = np.fmax(reach[k], (size + SAFETY * running).max(axis=0))
-    return reach - peak
+    own = _step_tolerance(tighter) / STEPS_SHARE
+    return np.fmax(reach, between.reach()) - peak + own * peak
 
 
 def bounds(run: RunLike, tighter: RunLike | None = None, model: Model | None = None) -> xr.Dataset:
@@ -142,7 +188,7 @@ def bounds(run: RunLike, tighter: RunLike | None = None, model: Model | None = N
     Returns:
         Dataset over (quantity, joint), in the quantities' units: `algebraic`, `integration` and
         `plus_minus`, their sum; the last two are NaN without `tighter`. Errors of the model, of
-        its data and of peaks between samples (`sampling` of `summary`) are not in it.
+        its data and of peaks that were not found (`sampling` of `summary`) are not in it.
     """
     import xarray as xr
 

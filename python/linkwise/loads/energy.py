@@ -38,38 +38,65 @@ def external_power(model: Model, q: Array, v: Array, wrenches: Array | None) -> 
     return power
 
 
-def energy_balance(run: RunLike, model: Model | None = None) -> xr.Dataset:
-    """Energy, the work that went in, and what does not add up.
+_RECORDED = ("drive_work", "external_work", "dissipated_energy")
 
-    Args:
-        run: Holds `position`, `velocity`, `drive_torque`, `energy` of all joints, and
-            `external_wrench` where there are wrenches.
-        model: The machine, if the run does not hold it.
 
-    Returns:
-        Dataset over time [J]: `kinetic_energy`, `potential_energy`, `drive_work`,
-        `external_work`, `dissipated` (all works since the first sample, by Simpson's rule),
-        `residual`: change of energy less drive and external work plus what was dissipated. It
-        holds the error of the integration and that of Simpson's rule at this sampling.
-    """
-    import xarray as xr
+def _recorded_works(run: RunLike) -> dict[str, Array] | None:
+    """The works that were integrated along with the steps, since the first sample; None where the
+    run holds none."""
+    if any(name not in run.dataset for name in _RECORDED):
+        return None
+    drive, outside, dissipated = (rows(run, name, slice(None)) for name in _RECORDED)
+    works = {"drive_work": drive.sum(axis=1), "external_work": outside, "dissipated": dissipated}
+    if not all(np.isfinite(work).all() for work in works.values()):
+        return None
+    return {name: work - work[0] for name, work in works.items()}
+
+
+def _sampled_works(run: RunLike, model: Model) -> dict[str, Array]:
+    """The same from the powers at the samples, by Simpson's rule."""
     from scipy.integrate import cumulative_simpson
 
-    machine = model_of(run, model)
-    wanted = ("joint_load", "position", "velocity", "drive_torque", "kinetic_energy")
-    need_whole(run, machine, *wanted)
     times = run.dataset["time"].values
     everything = slice(None)
     q, v = rows(run, "position", everything), rows(run, "velocity", everything)
     powers = {
         "drive_work": np.einsum("ti,ti->t", rows(run, "drive_torque", everything), v),
-        "external_work": external_power(machine, q, v, external(run, machine, everything)),
-        "dissipated": dissipated_power(machine, q, v),
+        "external_work": external_power(model, q, v, external(run, model, everything)),
+        "dissipated": dissipated_power(model, q, v),
     }
-    works = {
-        name: cumulative_simpson(power, x=times, initial=0) if times.size > 2 else 0 * power
+    return {
+        name: cumulative_simpson(power, x=times, initial=0) if times.size > 2 else np.nan * power
         for name, power in powers.items()
     }
+
+
+def energy_balance(run: RunLike, model: Model | None = None) -> xr.Dataset:
+    """Energy, the work that went in, and what does not add up.
+
+    Args:
+        run: Holds `energy` and `work` of all joints. Without `work`: `position`, `velocity`,
+            `drive_torque`, and `external_wrench` where there are wrenches.
+        model: The machine, if the run does not hold it.
+
+    Returns:
+        Dataset over time [J]: `kinetic_energy`, `potential_energy`, `drive_work`,
+        `external_work`, `dissipated` (all works since the first sample), `residual`: change of
+        energy less drive and external work plus what was dissipated. Where the run holds `work`,
+        the residual is the error of the integration at any sampling, and the attribute
+        `integrated` is "along the steps". Where it holds none, works are integrated from the
+        samples by Simpson's rule, whose error is in the residual too; `integrated` is then "from
+        the samples", and works of fewer than three samples are NaN.
+    """
+    import xarray as xr
+
+    machine = model_of(run, model)
+    works = _recorded_works(run)
+    along = works is not None
+    needed = ("drive_work",) if along else ("position", "velocity", "drive_torque")
+    need_whole(run, machine, "joint_load", *needed, "kinetic_energy")
+    if works is None:
+        works = _sampled_works(run, machine)
     stored = {name: run.dataset[name].values for name in ("kinetic_energy", "potential_energy")}
     energy = stored["kinetic_energy"] + stored["potential_energy"]
     works["residual"] = (
@@ -87,4 +114,5 @@ def energy_balance(run: RunLike, model: Model | None = None) -> xr.Dataset:
         name: ("time", values, {"long_name": names[name], "units": "J"})
         for name, values in {**stored, **works}.items()
     }
-    return xr.Dataset(data, coords={"time": run.dataset["time"]})
+    how = "along the steps" if along else "from the samples"
+    return xr.Dataset(data, coords={"time": run.dataset["time"]}, attrs={"integrated": how})

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from linkwise.base import Array, lengths
+from linkwise.base import DERIVED, Array, lengths
 from linkwise.loads.samples import Selection, joint_names, model_of, need, rows, select
 
 if TYPE_CHECKING:
@@ -53,10 +53,20 @@ QUANTITIES: dict[str, Quantity] = {
 }
 
 
+assert tuple(QUANTITIES) == DERIVED
+
+
 def joint_directions(model: Model) -> Array:
     """Direction of each joint's axis in its frame (joint, 3); NaN where it has no single one."""
     found = np.full((model.n_joints, 3), np.nan)
-    for k, axes in enumerate(model.joint_axes):
+    listed = model.joint_axes
+    single = [k for k, axes in enumerate(listed) if len(axes) == 1]
+    if single:
+        directions = np.array([listed[k][0][1] for k in single], dtype=np.float64)
+        found[single] = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    for k, axes in enumerate(listed):
+        if len(axes) == 1:
+            continue
         directions = np.array([axis[1] for axis in axes], dtype=np.float64).reshape(-1, 3)
         if len(directions) == 0:
             continue
@@ -115,6 +125,21 @@ def quantity_attrs(name: str) -> dict[str, str]:
     }
 
 
+def _drive_energy(run: RunLike, found: Selection, power: Array) -> tuple[Array, str]:
+    """Work of each joint's drive (time, joint) since the first sample, and how it was found."""
+    from scipy.integrate import cumulative_simpson
+
+    if "drive_work" in run.dataset:
+        each = rows(run, "drive_work", slice(None))
+        energy = np.zeros_like(power)
+        np.add.at(energy.T, found.owner, (each - each[0]).T)
+        return energy, "along the integration's own steps"
+    times = run.dataset["time"].values
+    if times.size < 3:
+        return np.full_like(power, np.nan), "not known from fewer than three samples"
+    return cumulative_simpson(power, x=times, axis=0, initial=0), "by Simpson's rule"
+
+
 def quantities(run: RunLike, model: Model | None = None) -> xr.Dataset:
     """Engineering quantities over time and joint, each with its convention in `attrs`.
 
@@ -125,10 +150,10 @@ def quantities(run: RunLike, model: Model | None = None) -> xr.Dataset:
     Returns:
         Dataset over (time, joint): `force`, `axial`, `radial`, `moment`, `tilting_moment`,
         `torque`, `drive_power`, `drive_energy` [J] (the power's integral since the first sample,
-        by Simpson's rule). NaN where a joint has no single axis.
+        along the integration's steps where the run holds `work`, else by Simpson's rule). NaN
+        where a joint has no single axis.
     """
     import xarray as xr
-    from scipy.integrate import cumulative_simpson
 
     need(run, "joint_load")
     machine = model_of(run, model)
@@ -140,17 +165,11 @@ def quantities(run: RunLike, model: Model | None = None) -> xr.Dataset:
         name: (("time", "joint"), array, quantity_attrs(name)) for name, array in values.items()
     }
     if "drive_power" in values:
-        times = run.dataset["time"].values
-        power = values["drive_power"]
-        energy = (
-            cumulative_simpson(power, x=times, axis=0, initial=0)
-            if times.size > 2
-            else np.zeros_like(power)
-        )
+        energy, how = _drive_energy(run, found, values["drive_power"])
         attrs = {
             "long_name": "drive energy",
             "units": "J",
-            "convention": "integral of drive_power since the first sample, by Simpson's rule",
+            "convention": f"integral of drive_power since the first sample, {how}",
         }
         data["drive_energy"] = (("time", "joint"), energy, attrs)
     return xr.Dataset(data, coords=coords)

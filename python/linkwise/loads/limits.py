@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.base import Array
+from linkwise.loads.extremes import extremes_of
 from linkwise.loads.samples import blocks, rows
 
 if TYPE_CHECKING:
@@ -35,7 +36,8 @@ def _limited(run: RunLike, model: Model) -> list[tuple[str, int, float, float]]:
 
 
 def beyond_limits(run: RunLike) -> list[dict[str, Any]]:
-    """Per joint beyond a limit: since when [s], and its farthest position there."""
+    """Per joint beyond a limit: since when [s], to a sample, and its farthest position there, to
+    the extremes between samples where the run holds them."""
     limited = _limited(run, run.load_model()) if "position" in run.dataset else []
     if not limited:
         return []
@@ -43,12 +45,22 @@ def beyond_limits(run: RunLike) -> list[dict[str, Any]]:
     lower, upper = np.array([row[2:] for row in limited]).T
     since, farthest = np.full((2, len(limited)), np.nan)
     worst = np.zeros(len(limited))
+    between = extremes_of(run, "position")
+    if between is not None:
+        q = np.stack([between.minimum, between.maximum])[:, columns]
+        when = np.stack([between.minimum_time, between.maximum_time])[:, columns]
+        past = np.maximum(lower - q, q - upper)
+        worst_end = np.argmax(past, axis=0), np.arange(len(limited))
+        beyond = past[worst_end] > 0
+        since[beyond] = when[worst_end][beyond]
+        farthest[beyond], worst[beyond] = q[worst_end][beyond], past[worst_end][beyond]
     times: Array = run.dataset["time"].values
     for where in blocks(run, 8 * run.dataset["position"].shape[1]):
         q = rows(run, "position", where)[:, columns]
         past = np.maximum(lower - q, q - upper)
         first_time = times[where][(past > 0).argmax(axis=0)]
-        since = np.where(np.isnan(since) & (past > 0).any(axis=0), first_time, since)
+        out = (past > 0).any(axis=0)
+        since = np.where(out, np.fmin(since, first_time), since)
         at = past.argmax(axis=0), np.arange(len(limited))
         farther = past[at] > worst
         farthest[farther], worst[farther] = q[at][farther], past[at][farther]

@@ -8,6 +8,7 @@ import numpy as np
 
 from linkwise.base import HALVES, Array, lengths
 from linkwise.loads.engineering import QUANTITIES, derived_rows, has_power, joint_directions
+from linkwise.loads.extremes import Extremes, extremes_of, load_at_extremes, quantity_rows
 from linkwise.loads.samples import (
     blocks,
     joint_names,
@@ -40,6 +41,22 @@ class _Statistics:
         self.total, self.squares = np.zeros(shape), np.zeros(shape)
         self.sampling = np.zeros(shape)
         self.wrench = np.full((*shape, 6), np.nan)
+        self.reach: Array | None = None
+
+    def begin(self, found: Extremes, wrench: Array, which: list[int]) -> None:
+        """From the extremes between the samples, of all derived quantities."""
+        self.peak, self.peak_time = (values[which] for values in found.largest)
+        self.largest = np.where(np.isnan(self.peak), -1.0, np.abs(self.peak))
+        self.minimum = np.where(np.isnan(self.peak), np.inf, found.minimum[which])
+        self.maximum = np.where(np.isnan(self.peak), -np.inf, found.maximum[which])
+        self.wrench, self.reach = wrench[which], found.reach[which]
+
+    def missed(self) -> Array:
+        """How much higher than found a peak may be."""
+        if self.reach is None:
+            return self.sampling
+        more: Array = np.maximum(self.reach - self.largest, 0.0)
+        return more
 
     def add(
         self, values: Array, load: Array, times: Array, weights: Array, first: int, count: int
@@ -86,8 +103,12 @@ def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
         Dataset over (quantity, joint): `peak` (the value of largest magnitude, with its sign),
         `peak_time`, `wrench` (component) at that time, `minimum`, `maximum`, `mean`, `rms` (over
         time, by the trapezoidal rule), `duty` (share of the time above a tenth of the peak) and
-        `sampling` (how much higher a smooth peak between the samples may be: an eighth of the
-        second difference). NaN where a joint has no single axis.
+        `sampling` (how much higher a peak may be that was not found). NaN where a joint has no
+        single axis. Peaks, minima and maxima are those of the whole motion, between the samples
+        too, where the run holds its extremes (`Recording.extremes`); `sampling` is then what
+        their search left open. Else they are those of the samples, and `sampling` is an eighth of
+        the second difference, which knows smooth peaks alone. The attribute `extremes` says
+        "along the steps" or "of the samples".
     """
     import xarray as xr
 
@@ -100,6 +121,9 @@ def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
     weights = trapezoid_weights(times)
     row_bytes = 8 * (6 + 3 * len(names)) * max(1, found.joints.size)
     collected = _Statistics(len(names), found.joints.size)
+    between = extremes_of(run, "quantity")
+    if between is not None:
+        collected.begin(between, load_at_extremes(run), quantity_rows(names))
     for where in blocks(run, row_bytes):
         wide = _with_neighbours(where, times.size)
         values = derived_rows(run, found, directions, wide)
@@ -122,8 +146,8 @@ def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
         "mean": (collected.total / span, "mean over time"),
         "rms": (np.sqrt(collected.squares / span), "root mean square over time"),
         "sampling": (
-            np.where(absent, np.nan, collected.sampling),
-            "what a smooth peak between samples may add",
+            np.where(absent, np.nan, collected.missed()),
+            "what a peak that was not found may add",
         ),
     }
     dims = ("quantity", "joint")
@@ -147,8 +171,12 @@ def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
             "joint": ("joint", joint_names(run)),
             "component": given["component"],
         },
-        attrs=kept_warnings(run.dataset.attrs),
+        attrs={**kept_warnings(run.dataset.attrs), **_how(between)},
     )
+
+
+def _how(between: Extremes | None) -> dict[str, str]:
+    return {"extremes": "of the samples" if between is None else "along the steps"}
 
 
 def envelope(run: RunLike) -> xr.Dataset:
@@ -156,6 +184,7 @@ def envelope(run: RunLike) -> xr.Dataset:
 
     Returns:
         Dataset: `minimum`, `minimum_time`, `maximum`, `maximum_time`; frame as `joint_load`.
+        Between the samples too, as in `summary`.
     """
     import xarray as xr
 
@@ -165,6 +194,10 @@ def envelope(run: RunLike) -> xr.Dataset:
     shape = (given.sizes["joint"], given.sizes["component"])
     found = {"minimum": np.full(shape, np.inf), "maximum": np.full(shape, -np.inf)}
     when = {name: np.zeros(shape) for name in found}
+    between = extremes_of(run, "joint_load")
+    if between is not None:
+        found = {"minimum": between.minimum, "maximum": between.maximum}
+        when = {"minimum": between.minimum_time, "maximum": between.maximum_time}
     for where in blocks(run, 48 * shape[0]):
         load = rows(run, "joint_load", where)
         for name, sign in (("minimum", -1.0), ("maximum", 1.0)):
@@ -178,7 +211,7 @@ def envelope(run: RunLike) -> xr.Dataset:
     for name, values in when.items():
         data[f"{name}_time"] = (dims, values, {"long_name": f"time of the {name}", "units": "s"})
     coords = {"joint": ("joint", joint_names(run)), "component": given["component"]}
-    return xr.Dataset(data, coords=coords)
+    return xr.Dataset(data, coords=coords, attrs=_how(between))
 
 
 def peak_loads(run: RunLike) -> xr.Dataset:
@@ -186,7 +219,8 @@ def peak_loads(run: RunLike) -> xr.Dataset:
 
     Returns:
         Dataset over `joint`: `force` [N] and `moment` [N m] (magnitudes of the joint load's two
-        halves, the moment about the joint point) with `force_time` and `moment_time` [s].
+        halves, the moment about the joint point) with `force_time` and `moment_time` [s]. Between
+        the samples too, as in `summary`.
 
     Raises:
         InputError: the run holds no joint loads or no samples.
@@ -196,6 +230,10 @@ def peak_loads(run: RunLike) -> xr.Dataset:
     names, times = joint_names(run), run.dataset["time"].values
     largest = np.full((2, len(names)), -1.0)
     when = np.zeros((2, len(names)))
+    between = extremes_of(run, "quantity")
+    if between is not None:
+        which = quantity_rows(["force", "moment"])
+        largest, when = between.maximum[which], between.maximum_time[which]
     for where in blocks(run, 48 * len(names)):
         load = rows(run, "joint_load", where).reshape(-1, len(names), 2, 3)
         size = lengths(load)
@@ -211,4 +249,5 @@ def peak_loads(run: RunLike) -> xr.Dataset:
         at_attrs = {"long_name": f"time of the largest joint {name}", "units": "s"}
         data[f"{name}_time"] = ("joint", when[k], at_attrs)
     joints = {"joint": ("joint", run.dataset["joint"].values)}
-    return xr.Dataset(data, coords=joints, attrs=kept_warnings(run.dataset.attrs))
+    attrs = {**kept_warnings(run.dataset.attrs), **_how(between)}
+    return xr.Dataset(data, coords=joints, attrs=attrs)

@@ -163,7 +163,7 @@ def blocks(run: RunLike, row_bytes: int) -> Iterator[slice]:
 
 
 def rows(run: RunLike, name: str, where: slice | Sequence[int]) -> Array:
-    """A variable's rows as (time, ...) in the model's order.
+    """A variable's rows as (time, ...) in the model's order; the extremes have no time.
 
     Raises InputError where the files are damaged or a joint load is not a number.
     """
@@ -171,7 +171,8 @@ def rows(run: RunLike, name: str, where: slice | Sequence[int]) -> Array:
     last = [dim for dim in variable.dims if dim != "time"]
     shown = f"run {str(run.path)!r}" if run.path is not None else "run"
     try:
-        values = variable.transpose("time", *last)[where].values
+        ordered = variable.transpose("time", *last) if "time" in variable.dims else variable
+        values = ordered[where].values
     except InputError:  # a ValueError; it names the file
         raise
     except (RuntimeError, OSError, ValueError) as error:

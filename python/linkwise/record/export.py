@@ -47,9 +47,9 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
                 str(name), tuple(str(dim) for dim in variable.dims), _netcdf_type(variable.dtype)
             )
             made.attrs.update(variable.attrs)
-            if name in dataset.coords:
+            if name in dataset.coords or "time" not in variable.dims:
                 made[...] = _netcdf_values(variable.values)
-            else:
+            if name not in dataset.coords:
                 extra = [str(c) for c in dataset[name].coords if c not in variable.dims]
                 if extra:
                     made.attrs["coordinates"] = " ".join(extra)
@@ -114,9 +114,11 @@ def write_csv(
 ) -> list[Path]:
     target = Path(os.path.abspath(path))
     tables: dict[str, list[str]] = {}
-    for key in dataset.data_vars:
+    for key, variable in dataset.data_vars.items():
+        if "time" not in variable.dims:  # extremes: `summary` and `envelope` are their tables
+            continue
         tables.setdefault(_GROUPS.get(str(key), str(key)), []).append(str(key))
-    if quantity is not None and quantity in dataset.data_vars:
+    if quantity is not None and quantity in itertools.chain(*tables.values()):
         wanted = {quantity: [quantity]}
     elif quantity is not None:
         if quantity not in tables:

@@ -35,7 +35,9 @@ class MemoryRecord:
         for name, values in rows.items():
             self._chunks[name].append(values)
 
-    def finish(self, attrs: Mapping[str, Any]) -> xr.Dataset:
+    def finish(
+        self, attrs: Mapping[str, Any], extremes: Mapping[str, AnyArray] | None = None
+    ) -> xr.Dataset:
         import xarray as xr
 
         self._attrs.update(attrs)
@@ -52,6 +54,11 @@ class MemoryRecord:
             if chunks:
                 np.concatenate(chunks, out=values)
             data[variable.name] = (("time", *variable.dims), values, dict(variable.attrs))
+        data |= {
+            v.name: (v.dims, (extremes or {})[v.name], dict(v.attrs))
+            for v in self._schema.timeless
+            if extremes
+        }
         return xr.Dataset(
             data,
             coords={"time": ("time", time, dict(TIME_ATTRS)), **coordinates},

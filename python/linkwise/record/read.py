@@ -15,6 +15,7 @@ import numpy as np
 from linkwise._core import InputError
 from linkwise.base import Array
 from linkwise.record.checksums import LIST, damage, reason
+from linkwise.record.extremes import PREFIX
 from linkwise.record.labels import text_array
 from linkwise.record.model import GROUP
 from linkwise.record.provenance import FORMAT_KEY
@@ -118,7 +119,7 @@ def open_dataset(path: Path, *, finished: bool) -> xr.Dataset:
         try:
             array = open_array(store, name)
         except InputError as error:
-            if name not in ORDER:
+            if name not in ORDER and not name.startswith(PREFIX):
                 raise
             _left_out(error, name)
             continue

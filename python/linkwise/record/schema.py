@@ -6,16 +6,17 @@ One description serves the results kept in memory, those in a Zarr store and tho
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from linkwise._core import InputError
 from linkwise._core import quantities as recorded_quantities
 from linkwise.base import COMPONENTS, AnyArray
+from linkwise.record.extremes import ExtremesLayout, extremes_layout, labels
 from linkwise.record.labels import Scalars, joint_scalars, text_array
+from linkwise.record.variable import Variable
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -33,29 +34,6 @@ def _attrs(row: Mapping[str, Any]) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Variable:
-    """One recorded array; `take` picks its columns from what the core returns."""
-
-    name: str
-    dims: tuple[str, ...]
-    shape: tuple[int, ...]  # without time
-    dtype: np.dtype[Any]
-    attrs: Mapping[str, str]
-    take: npt.NDArray[np.intp] | None = None
-
-    @property
-    def row_bytes(self) -> int:
-        return int(np.prod(self.shape, dtype=np.int64)) * self.dtype.itemsize
-
-    def rows(self, chunk: Mapping[str, Any], count: int) -> AnyArray:
-        """This variable's rows of one chunk returned by `Simulation.advance`."""
-        values = np.asarray(chunk[self.name])
-        if self.take is not None:
-            values = values[:, self.take]
-        return np.ascontiguousarray(values, dtype=self.dtype).reshape((count, *self.shape))
-
-
-@dataclass(frozen=True)
 class Coordinate:
     dims: tuple[str, ...]
     values: AnyArray
@@ -67,13 +45,18 @@ class Schema:
     variables: tuple[Variable, ...]
     coordinates: Mapping[str, Coordinate]
     quantities: tuple[str, ...]
+    extremes: ExtremesLayout | None = None
+
+    @property
+    def timeless(self) -> tuple[Variable, ...]:
+        return self.extremes.variables if self.extremes else ()
 
     @property
     def row_bytes(self) -> int:
         return 8 + sum(variable.row_bytes for variable in self.variables)
 
 
-# The order in which a dataset lists its variables.
+# The order in which a dataset lists its variables; extremes follow.
 ORDER = tuple(row["name"] for row in TABLE)
 TIME_ATTRS = {"long_name": "time", "units": "s"}
 
@@ -116,6 +99,8 @@ def _scalar_variable(
         units = text_array(
             {"rad": "N m", "m": "N"}.get(u, "N m or N") for u in scalars.units.tolist()
         )
+    elif row["units"] == "energy":
+        units = text_array("J" for _ in scalars.units)
     else:
         units = text_array(u + row["units"] for u in scalars.units.tolist())
     distinct = set(units.tolist())
@@ -189,10 +174,13 @@ def build_schema(
     quantities: Collection[str] | None = None,
     joints: Sequence[str] | None = None,
     wrenched: Collection[str] = (),
+    *,
+    extremes: bool = False,
 ) -> Schema:
     """Describe a run of `model` that keeps these quantities of these joints.
 
-    `wrenched` names the bodies with an external wrench, which is recorded for them alone.
+    `wrenched` names the bodies with an external wrench, which is recorded for them alone;
+    `extremes` keeps those of loads between the samples, where loads are recorded.
     """
     kept = resolve_quantities(quantities)
     rows = [row for row in TABLE if row["group"] in kept]
@@ -213,4 +201,9 @@ def build_schema(
         for row in rows
         if row["axis"] == "none"
     ]
-    return Schema(tuple(variables), coordinates, kept)
+    schema = Schema(tuple(variables), coordinates, kept)
+    layout = extremes_layout(model, schema.variables) if extremes else None
+    if layout is None:
+        return schema
+    coordinates |= {name: Coordinate((name,), values) for name, values in labels().items()}
+    return replace(schema, extremes=layout)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,8 @@ from linkwise.record.model import write_model
 from linkwise.record.provenance import plain
 from linkwise.record.read import open_dataset
 from linkwise.record.replace import beside, clear_leftovers, remove_run, take_place
-from linkwise.record.schema import TIME_ATTRS, Coordinate, Schema, Variable
+from linkwise.record.schema import TIME_ATTRS, Coordinate, Schema
+from linkwise.record.variable import Variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,6 +82,7 @@ class RunWriter:
         samples: int,
         model: Model | None = None,
         flush_seconds: float = FLUSH_SECONDS,
+        extremes: Callable[[], Mapping[str, AnyArray]] | None = None,
     ) -> None:
         self._shown = repr(os.fspath(path))
         # Absolute: a drive or another thread may change the folder of the process.
@@ -92,6 +94,7 @@ class RunWriter:
         self._samples = samples
         self._rows = block_rows(schema, samples)
         self._flush_seconds = flush_seconds
+        self._extremes = extremes
         self._written = 0
         self._pending: list[tuple[AnyArray, dict[str, AnyArray]]] = []
         self._waiting = 0
@@ -146,7 +149,8 @@ class RunWriter:
 
         self._store = WritingStore(where)
         group = zarr.open_group(self._store, mode="r+", zarr_format=3, use_consolidated=False)
-        names = ["time", *(variable.name for variable in self._schema.variables)]
+        kept = (*self._schema.variables, *self._schema.timeless)
+        names = ["time", *(variable.name for variable in kept)]
         # A chunk that holds nothing but fill values is a file, too: one that is missing is damage.
         with zarr.config.set({"array.write_empty_chunks": True}):
             self._arrays: dict[str, Any] = {name: group[name] for name in names}
@@ -170,6 +174,17 @@ class RunWriter:
                 dtype=variable.dtype,
                 fill_value=0 if whole_numbers else np.nan,
                 dimension_names=("time", *variable.dims),
+                attributes={**variable.attrs},
+                compressors=packing(),
+            )
+        for variable in self._schema.timeless:
+            group.create_array(
+                variable.name,
+                shape=variable.shape,
+                chunks=tuple(max(1, size) for size in variable.shape),
+                dtype=variable.dtype,
+                fill_value=np.nan,
+                dimension_names=variable.dims,
                 attributes={**variable.attrs},
                 compressors=packing(),
             )
@@ -229,6 +244,8 @@ class RunWriter:
         try:
             for name, values in rows.items():
                 self._arrays[name][where] = values
+            if self._extremes is not None and self._schema.timeless:
+                self._write_extremes(self._extremes())
             self._arrays["time"][where] = times  # last: it says that the others are complete
             self._store.shorten_list(MOST_LINES)
         except OSError as error:
@@ -242,12 +259,19 @@ class RunWriter:
         if self._aside is not None and self._written > 1:  # more than the state at the start
             self._take_place()
 
+    def _write_extremes(self, found: Mapping[str, AnyArray]) -> None:
+        for name, values in found.items():
+            if values.size:
+                self._arrays[name][...] = values
+
     def flush(self) -> None:
         if self._waiting and not self._broken:
             self._write(self._waiting)
 
-    def finish(self, attrs: Mapping[str, Any]) -> xr.Dataset:
-        """Write what waits and the final attributes; return the opened results.
+    def finish(
+        self, attrs: Mapping[str, Any], extremes: Mapping[str, AnyArray] | None = None
+    ) -> xr.Dataset:
+        """Write what waits, the extremes and the final attributes; return the opened results.
 
         A run that failed at its start does not take the place of an older one: it is returned in
         memory, and `path` is None.
@@ -257,6 +281,8 @@ class RunWriter:
             (folder / GROUP / SPARE).unlink(missing_ok=True)
             try:
                 self.flush()
+                if self._schema.extremes:
+                    self._write_extremes(extremes or self._schema.extremes.empty())
             finally:
                 self._group.update_attributes({name: plain(value) for name, value in attrs.items()})
                 with contextlib.suppress(OSError):

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from linkwise import _core
 from linkwise._core import Frame, InputError, Model, as_floats
 from linkwise.base import Array
+from linkwise.loads.engineering import joint_directions
 from linkwise.notes import tell, warning_attrs, warnings_of
 from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
@@ -87,6 +88,14 @@ def _dataset(
         )
         for variable in schema.variables
     }
+    data |= {
+        variable.name: (
+            (*dims, *variable.dims),
+            columns[variable.name].reshape((*lead, *variable.shape)),
+            dict(variable.attrs),
+        )
+        for variable in schema.timeless
+    }
     coordinates = {
         name: (coordinate.dims, coordinate.values, dict(coordinate.attrs))
         for name, coordinate in schema.coordinates.items()
@@ -116,6 +125,7 @@ def simulate_batch(
     times: npt.ArrayLike | None = None,
     integrator: str = "runge_kutta_4",
     record: Collection[str] | None = None,
+    extremes: bool = False,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Simulate many motions at once with fixed steps: members in SIMD lanes, lanes over threads.
@@ -136,6 +146,8 @@ def simulate_batch(
         integrator: One with a fixed step: "runge_kutta_4" or "semi_implicit_euler".
         record: Names of the quantities to record, of those that `linkwise.quantities()` marks
             `of_members`; all of them by default.
+        extremes: Whether the extremes between samples are kept as well, where joint loads are
+            recorded: see `Recording`.
         threads: Worker threads; the results do not depend on it.
 
     Returns:
@@ -152,7 +164,7 @@ def simulate_batch(
     models = _machines(model)
     first = models[0]
     sampled = sample_times(duration, every, times)
-    schema = build_schema(first, QUANTITIES if record is None else record)
+    schema = build_schema(first, QUANTITIES if record is None else record, extremes=extremes)
     unknown = [name for name in schema.quantities if name not in QUANTITIES]
     if unknown:
         raise InputError(f"record: a batch has no {unknown[0]!r}; use {', '.join(QUANTITIES)}")
@@ -171,6 +183,8 @@ def simulate_batch(
         by_joint, by_name = check_driven(one, drives, wrenches)
         simulation = _core.Simulation(one, **options, method="articulated_body", threads=1)
         notes = set_driven(simulation, one, by_joint, by_name, float(sampled[-1]))
+        if schema.extremes:
+            simulation.keep_extremes(joint_directions(one))
         simulations.append(simulation)
     lead, rows = _members(given, len(models))
     lead = lead if isinstance(model, Model) else (len(models), *lead)
@@ -181,7 +195,7 @@ def simulate_batch(
     )
     ignored = warnings_of(*models)
     tell(ignored, reading=False)
-    columns, endings, interrupted = _core.simulate_members(
+    columns, flat, endings, interrupted = _core.simulate_members(
         simulations,
         q0=rows["q0"],
         v0=rows["v0"],
@@ -190,6 +204,8 @@ def simulate_batch(
         quantities=schema.quantities,
         threads=optional_count("threads", threads),
     )
+    if schema.extremes:
+        columns |= schema.extremes.split(flat)
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
     early = sum(ending.outcome != "converged" for ending in endings)
     attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)

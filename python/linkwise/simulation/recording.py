@@ -6,7 +6,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from linkwise._core import InputError
 from linkwise.simulation.arguments import options_object
+
+# Extremes of larger machines are kept if asked for: they take as much memory as five samples.
+MOST_JOINTS = 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,12 +20,24 @@ class Recording:
     Attributes:
         quantities: Names, of those that `linkwise.quantities()` lists as groups; all by default.
         joints: Names of the joints to record; all by default.
+        extremes: Whether the extremes of loads, motions and drive torques are kept between the
+            samples too, for `linkwise.loads`. By default they are where joint loads are recorded,
+            of machines with up to 10,000 joints.
         scenario_text: Kept with the results, to tell where they come from.
     """
 
     quantities: Collection[str] | None = None
     joints: Sequence[str] | None = None
+    extremes: bool | None = None
     scenario_text: str = ""
+
+    def keeps_extremes(self, joints: int) -> bool:
+        """Whether a machine with so many joints keeps them."""
+        if self.extremes is None:
+            return joints <= MOST_JOINTS
+        if not isinstance(self.extremes, bool):
+            raise InputError(f"extremes: is {self.extremes!r}; use True, False or None")
+        return self.extremes
 
     @classmethod
     def of(

@@ -15,9 +15,10 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import Frame, InputError
-from linkwise.base import Array
+from linkwise.base import AnyArray, Array
 from linkwise.drives import as_drive, as_wrench
 from linkwise.drives.course import Span
+from linkwise.loads.engineering import joint_directions
 from linkwise.notes import Ignored, tell, warning_attrs, warnings_of
 from linkwise.record.claim import check_target
 from linkwise.record.memory import MemoryRecord
@@ -150,10 +151,20 @@ def _recorder(
     attrs: Mapping[str, Any],
     samples: int,
     output: str | os.PathLike[str] | None,
+    extremes: Callable[[], dict[str, AnyArray]],
 ) -> MemoryRecord | RunWriter:
     if output is None:
         return MemoryRecord(schema, attrs)
-    return RunWriter(output, schema, attrs, samples=samples, model=model)
+    return RunWriter(output, schema, attrs, samples=samples, model=model, extremes=extremes)
+
+
+def _extremes(simulation: Simulation, schema: Schema) -> dict[str, AnyArray]:
+    """What was found so far, by variable; none where a function of the caller's fails again."""
+    if schema.extremes is None:
+        return {}
+    with contextlib.suppress(Exception):
+        return schema.extremes.split(simulation.extremes())
+    return schema.extremes.empty()
 
 
 def _record(
@@ -177,10 +188,12 @@ def _record(
         # full.
         said = {"outcome": "error", "message": f"{type(error).__name__}: {error}"}
         with contextlib.suppress(Exception):
-            record.finish(said | warning_attrs([*_stiffness(simulation), *ignored]))
+            said |= warning_attrs([*_stiffness(simulation), *ignored])
+            record.finish(said, _extremes(simulation, schema))
         raise
     attrs = _attributes_at_end(simulation, clock.monotonic() - started)
-    finished = record.finish(attrs | warning_attrs([*_stiffness(simulation), *ignored]))
+    attrs |= warning_attrs([*_stiffness(simulation), *ignored])
+    finished = record.finish(attrs, _extremes(simulation, schema))
     return Run(finished, record.path, model), ending
 
 
@@ -293,8 +306,13 @@ def simulate(
     chosen = options_object("numerics", Numerics, numerics, options)
     for name in options:
         raise TypeError(f"simulate() got an unexpected keyword argument {name!r}")
-    wrenched = wrenched_bodies(model, by_name)
-    schema = build_schema(model, recording.quantities, recording.joints, wrenched)
+    schema = build_schema(
+        model,
+        recording.quantities,
+        recording.joints,
+        wrenched_bodies(model, by_name),
+        extremes=recording.keeps_extremes(model.n_joints),
+    )
     if on_failure not in ("raise", "return"):
         raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
     if output is not None:
@@ -304,6 +322,8 @@ def simulate(
     count = optional_count("threads", threads)
     simulation = _core.Simulation(model, **options, threads=count)
     notes = set_driven(simulation, model, by_joint, by_name, float(sampled[-1]), start)
+    if schema.extremes:
+        simulation.keep_extremes(joint_directions(model))
     simulation.start(0.0, *start)
     attrs = provenance(
         model,
@@ -324,7 +344,9 @@ def simulate(
     if output is None:
         _require_memory(schema, sampled.size)
     tell(warnings_of(model), reading=False)
-    recorder = _recorder(model, schema, attrs, sampled.size, output)
+    recorder = _recorder(
+        model, schema, attrs, sampled.size, output, lambda: _extremes(simulation, schema)
+    )
     run, ending = _record(model, simulation, recorder, schema, sampled, progress, ignored)
     if on_failure == "raise":
         raise_failure(model, ending, run)

@@ -54,12 +54,16 @@ int AppliedForces::joint_with_bad_force(size_t member) const {
 }
 
 void AppliedForces::add_holding_torques(const double* total) {
+  for (size_t i = 0; i < members_; ++i)
+    add_holding_torques(total + i * nv_, tau(i), drive_.data() + i * nv_);
+}
+
+void AppliedForces::add_holding_torques(const double* total, const double* tau,
+                                        double* drive) const {
   for (int j = 0; j < setup_.model->n_joints(); ++j) {
     if (!is_prescribed(setup_.drives[j].kind)) continue;
     const JointInfo& info = setup_.model->joints[j];
-    for (size_t i = 0; i < members_; ++i)
-      for (size_t k = i * nv_ + info.v; k < i * nv_ + info.v + info.nv; ++k)
-        drive_[k] += total[k] - tau_[k];
+    for (int k = info.v; k < info.v + info.nv; ++k) drive[k] += total[k] - tau[k];
   }
 }
 

@@ -29,6 +29,8 @@ class AppliedForces {
   /// Adds to drive() the torques of joints of given motion: `total`, the torques [members][nv] that
   /// their accelerations take, less what acts by itself.
   void add_holding_torques(const double* total);
+  /// The same of one member: to `drive` [nv], of the applied torques `tau`.
+  void add_holding_torques(const double* total, const double* tau, double* drive) const;
 
  private:
   const Setup& setup_;

@@ -19,7 +19,7 @@ Start members_of(const Start& all, const Model& m, size_t first, size_t count) {
 std::vector<Ending> simulate_batch(std::span<const Simulation* const> simulations,
                                    const Start& start, std::span<const double> times,
                                    const Sample& samples, const Executor& executor,
-                                   const std::function<bool()>& go_on) {
+                                   const std::function<bool()>& go_on, double* extremes) {
   std::vector<Ending> endings(start.members);
   const size_t per_simulation = start.members / simulations.size();
   for (size_t k = 0; k < simulations.size(); ++k) {
@@ -42,13 +42,19 @@ std::vector<Ending> simulate_batch(std::span<const Simulation* const> simulation
     const size_t n = std::min<size_t>(native_lanes, per_simulation - begin);
     const size_t first = task / groups * per_simulation + begin;
     group.set_interrupt([&] { return !go_on(); });
+    if (extremes) group.keep_extremes(simulations[task / groups]->directions());
     group.start(0, members_of(start, m, first, n));
     for (size_t k = 0; k < times.size(); ++k) {
       const Sample row = out.at(m, first, k);
       if (group.advance(times[k], row)) continue;
       for (size_t i = 0; i < n; ++i) row.write(m, i, nullptr);
     }
-    for (size_t i = 0; i < n; ++i) endings[first + i] = group.ending(i);
+    for (size_t i = 0; i < n; ++i) {
+      endings[first + i] = group.ending(i);
+      if (!extremes) continue;
+      const std::vector<double> found = group.extremes(i);
+      std::copy(found.begin(), found.end(), extremes + (first + i) * found.size());
+    }
   });
   return endings;
 }

@@ -14,11 +14,12 @@ namespace linkwise {
 /// Simulates from time 0 on. Model, drives, wrenches and numerics are those of the simulations,
 /// which check_members() must take and which share the members of the start equally. Arrays of
 /// `samples` are [member][time][...], NaN after a member's end: a member that fails ends alone.
-/// `go_on` is asked at every step, from any thread; once it is false, members under way end as
-/// `interrupted`.
+/// extremes: of each member, rows of Extremes::size(); null: not kept, which is up to the
+/// simulations. `go_on` is asked at every step, from any thread; once it is false, members under
+/// way end as `interrupted`.
 std::vector<Ending> simulate_batch(std::span<const Simulation* const> simulations,
                                    const Start& start, std::span<const double> times,
                                    const Sample& samples, const Executor& executor,
-                                   const std::function<bool()>& go_on);
+                                   const std::function<bool()>& go_on, double* extremes = nullptr);
 
 }  // namespace linkwise

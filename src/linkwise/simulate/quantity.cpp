@@ -14,6 +14,13 @@ using enum Axis;
 
 void copy(const double* from, size_t n, double* to) { std::copy(from, from + n, to); }
 
+void copy_work(const Instant& at, size_t first, size_t n, double* to) {
+  if (at.work)
+    copy(at.work + first, n, to);
+  else
+    std::fill_n(to, n, std::numeric_limits<double>::quiet_NaN());
+}
+
 constexpr QuantityEntry table[] = {
     {"position", "position", coordinates, Needs::state, true, "", "joint position", "", "",
      "zero as in the model file; angles are not wrapped; quaternions are x, y, z, w and take "
@@ -46,6 +53,16 @@ constexpr QuantityEntry table[] = {
          std::fill_n(out, n, 0.0);
      },
      nullptr},
+    {"drive_work", "work", rates, Needs::works, true, "energy", "work of the drive", "", "",
+     "integral of drive_torque * velocity since the start, along the integration's own steps",
+     [](const Instant& at, double* out) { copy_work(at, 0, at.model.nv(), out); }, nullptr},
+    {"external_work", "work", none, Needs::works, true, "J", "work of the external wrenches", "",
+     "", "since the start, along the integration's own steps",
+     [](const Instant& at, double* out) { copy_work(at, at.model.nv(), 1, out); }, nullptr},
+    {"dissipated_energy", "work", none, Needs::works, true, "J",
+     "energy taken by damping, friction and the damping of stops", "", "",
+     "since the start, along the integration's own steps",
+     [](const Instant& at, double* out) { copy_work(at, at.model.nv() + 1, 1, out); }, nullptr},
     {"kinetic_energy", "energy", none, Needs::state, true, "J", "kinetic energy", "", "", "",
      [](const Instant& at, double* out) { *out = kinetic_energy(at.model, at.q, at.v); }, nullptr},
     {"potential_energy", "energy", none, Needs::state, true, "J",
@@ -90,7 +107,9 @@ size_t quantity_width(const QuantityEntry& entry, const Model& model) {
 
 bool Sample::needs(Needs needs) const {
   for (size_t k = 0; k < std::size(table); ++k)
-    if ((values[k] || counts[k]) && table[k].needs >= needs) return true;
+    if ((values[k] || counts[k]) &&
+        (table[k].needs == needs || (needs == Needs::forces && table[k].needs == Needs::loads)))
+      return true;
   return false;
 }
 

@@ -21,6 +21,7 @@ struct Instant {
   const double *q, *v;
   const double *du, *joint_load, *drive_torque;
   const double* external;  ///< null: nothing acts
+  const double* work;      ///< of a WorkIntegral; null: not known
   const SimulationStatistics& statistics;
 };
 
@@ -30,7 +31,7 @@ enum class Axis { coordinates, rates, joints, bodies, none };
 std::string_view to_string(Axis axis);
 
 /// What has to be computed before it can be written.
-enum class Needs { state, forces, loads };
+enum class Needs { state, works, forces, loads };
 
 struct QuantityEntry {
   std::string_view name;
@@ -38,7 +39,8 @@ struct QuantityEntry {
   Axis axis;
   Needs needs;
   bool of_members;  ///< also recorded where many simulations run at once
-  /// Per axis rates and coordinates: what follows the unit of the coordinate; else the unit.
+  /// Per axis rates and coordinates: what follows the unit of the coordinate, or "force" or
+  /// "energy"; else the unit.
   std::string_view units;
   std::string_view long_name, frame, point, convention;
   void (*write)(const Instant&, double*);  ///< or null, where it is a whole number:
@@ -55,7 +57,7 @@ size_t quantity_width(const QuantityEntry& entry, const Model& model);
 /// Where samples go, by place in the table; null pointers are not computed. Rows of one member are
 /// next to each other.
 struct Sample {
-  static constexpr size_t size = 16;  ///< at least that of the table
+  static constexpr size_t size = 24;  ///< at least that of the table
   std::array<double*, size> values{};
   std::array<std::int64_t*, size> counts{};
   size_t rows = 1;  ///< from one member to the next

@@ -45,6 +45,20 @@ void Setup::add_wrench(Wrench wrench) {
   settled_ = false;
 }
 
+bool Setup::does_work() const {
+  bool driven = false;
+  for (const Drive& drive : drives)
+    driven |= drive.kind != DriveKind::free && drive.kind != DriveKind::locked;
+  return driven || !wrenches.empty() || model->has_passive_forces();
+}
+
+bool Setup::calls_functions() const {
+  bool any = false;
+  for (const Drive& drive : drives) any |= drive.callable || drive.motion;
+  for (const Wrench& wrench : wrenches) any |= static_cast<bool>(wrench.callable);
+  return any;
+}
+
 void Setup::settle() {
   if (settled_) return;
   any_motion_ = false;

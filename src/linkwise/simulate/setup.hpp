@@ -41,6 +41,10 @@ struct Setup {
   const Model& driven() const { return driven_ ? *driven_ : *model; }
   bool any_given() const { return driven_ != nullptr; }
   bool any_motion() const { return any_motion_; }
+  /// Whether anything but gravity, springs and what holds locked joints may do work.
+  bool does_work() const;
+  /// Whether drives or wrenches are functions of the caller's.
+  bool calls_functions() const;
   /// Of every drive and wrench that has some.
   const std::vector<Breakpoints>& breakpoints() const { return breakpoints_; }
 

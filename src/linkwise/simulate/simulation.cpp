@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/evaluator.hpp"
@@ -50,6 +51,9 @@ void Simulation::start(double t0, const Start& start) {
   endings_.assign(members_, {Outcome::converged, t0, "", ""});
   failure_ = {};
   iterations_ = 0;
+  work_.reset();
+  work_is_done_ = start.tau || setup_->does_work();
+  sampled_ = false;
   if (observer_) observer_->started();
   state_.reset();
   OdeSystem* system = this;
@@ -65,6 +69,12 @@ void Simulation::start(double t0, const Start& start) {
   }
   integrator_ = make_integrator(setup_->options.integrator, *system, setup_->options.integration);
   start_.assign(y_.begin(), y_.begin() + position_size());
+  extremes_.clear();
+  for (size_t i = 0; i < members_ && !directions_.empty(); ++i) {
+    extremes_.emplace_back(*setup_, start.tau ? start.tau + i * nv() : nullptr, directions_);
+    extremes_[i].begin(t0, y_.data() + i * nq(), rates_in(y_.data()) + i * nv());
+  }
+  extremes_until_ = advanced_to_ = t0;
   if (state_) return integrator_->start(t0, state_->from_rates(y_));
   std::vector<double> y = y_;
   for (size_t i = 0; i < members_; ++i)
@@ -76,6 +86,7 @@ void Simulation::make_methods(double t0) {
   method_.reset();
   output_method_.reset();
   aside_method_.reset();
+  work_method_.reset();
   solver_tolerance_.reset();
   lanes_.reset();
   if (members_ > 1) {
@@ -338,11 +349,13 @@ bool Simulation::end_all(const Ending& ending) {
 
 bool Simulation::reach(double t) {
   while (integrator_->time() < t) {
+    add_step_to_extremes();
     if (!any_running()) return false;
     Outcome outcome = Outcome::interrupted;
     if (!interrupted_ || !interrupted_()) outcome = integrator_->step(t);
     if (outcome == Outcome::converged) {
       failure_ = {};  // the step recovered from it
+      if (work_ && work_is_done_) add_work_of_step();
       continue;
     }
     // The failure within the step says more than the failure of the step.
@@ -350,11 +363,23 @@ bool Simulation::reach(double t) {
     return end_all({outcome, integrator_->time(),
                     outcome == Outcome::interrupted ? "" : failure_.joint, described(outcome)});
   }
+  if (integrator_->time() == t) add_step_to_extremes();
   return any_running();
 }
 
 bool Simulation::advance(double t, const Sample& sample) {
+  const bool asks_work = sample.needs(Needs::works);
+  if (!std::exchange(sampled_, true) && asks_work)
+    work_.emplace(model(), members_, integrator_->time());
   if (!reach(t)) return false;
+  advanced_to_ = t;
+  if (work_ && work_is_done_ && asks_work) work_->reach(t);
+  interpolate(t);
+  return write_sample(t, sample);
+}
+
+/// Writes the state at t, within the last step, into y_.
+void Simulation::interpolate(double t) {
   if (state_) {
     state_->interpolate(*integrator_, t, y_);
   } else {
@@ -362,7 +387,77 @@ bool Simulation::advance(double t, const Sample& sample) {
     to_state(y_.data());
   }
   impose(t, y_.data());
-  return write_sample(t, sample);
+}
+
+void Simulation::add_work_of_step() {
+  work_->add_step(integrator_->time(), nodes_of_work(),
+                  [this](double t, double* out) { powers(t, out); });
+}
+
+/// The last step counts once it is reached as a whole.
+void Simulation::add_step_to_extremes() {
+  const double t = integrator_->time();
+  if (extremes_.empty() || !(t > extremes_until_)) return;
+  interpolate_step(t);
+  for (size_t i = 0; i < members_; ++i)
+    if (endings_[i].ok()) add_step(i, t, breaks_at(t), extremes_[i]);
+  extremes_until_ = t;
+}
+
+/// From where extremes were kept until t.
+void Simulation::interpolate_step(double t) {
+  interpolate(extremes_until_ + (t - extremes_until_) / 2);
+  middle_ = y_;
+  interpolate(t);
+}
+
+void Simulation::add_step(size_t member, double t, bool breaks, Extremes& to) const {
+  to.add_step(middle_.data() + member * nq(), rates_in(middle_.data()) + member * nv(), t,
+              y_.data() + member * nq(), rates_in(y_.data()) + member * nv(), breaks);
+}
+
+std::vector<double> Simulation::extremes(size_t member) {
+  Extremes whole = extremes_[member];
+  if (advanced_to_ > extremes_until_ && endings_[member].ok()) {
+    interpolate_step(advanced_to_);
+    add_step(member, advanced_to_, false, whole);
+  }
+  return whole.found();
+}
+
+/// A method of order p resolves the motion up to the power p of time; of given motions, which are
+/// not integrated, it says nothing. Functions of the caller's may cost more than all the rest:
+/// there the quadrature alone is as good.
+int Simulation::nodes_of_work() const {
+  const int order = setup_->any_motion() ? WorkIntegral::most_nodes - 1 : statistics().last_order;
+  return setup_->calls_functions() ? order / 2 + 2 : order + 2;
+}
+
+/// What holds joints of given motion follows from the accelerations of the others.
+void Simulation::powers(double t, double* out) {
+  interpolate(t);
+  const double* v = rates_in(y_.data());
+  bool known = true;
+  if (setup_->any_motion()) {
+    if (any_ended()) stand_in(y_.data());
+    if (!lanes_ && !work_method_)
+      work_method_ = make_dynamics(setup_->driven(), setup_->options.dynamics);
+    const long iterations = iterations_;
+    const Ending failure = failure_;
+    du_.resize(members_ * nv());
+    known =
+        accelerations(work_method_.get(), t, y_.data(), du_.data(), nullptr) == Outcome::converged;
+    iterations_ = iterations;
+    failure_ = failure;
+    if (work_method_) work_method_->accepted(t);
+    add_holding_torques();
+  } else {
+    forces_->evaluate(t, y_.data(), v);
+  }
+  const size_t width = WorkIntegral::width(model());
+  for (size_t i = 0; i < members_; ++i)
+    write_powers(model(), *forces_, i, y_.data() + i * nq(), v + i * nv(), out + i * width);
+  if (!known) std::fill_n(out, members_ * width, std::numeric_limits<double>::quiet_NaN());
 }
 
 bool Simulation::write_sample(double t, const Sample& sample) {
@@ -388,6 +483,7 @@ bool Simulation::write_sample(double t, const Sample& sample) {
                      loads_.data() + i * n_load(),
                      forces_->drive(i),
                      forces_->external(i),
+                     work_ ? work_->of(i) : nullptr,
                      now};
     const bool running = endings_[i].ok();
     sample.write(model(), i, running ? &at : nullptr);

@@ -8,11 +8,13 @@
 
 #include "linkwise/dynamics/batch.hpp"
 #include "linkwise/simulate/applied_forces.hpp"
+#include "linkwise/simulate/extremes.hpp"
 #include "linkwise/simulate/parent_axes.hpp"
 #include "linkwise/simulate/quantity.hpp"
 #include "linkwise/simulate/setup.hpp"
 #include "linkwise/simulate/solver_tolerance.hpp"
 #include "linkwise/simulate/step_limits.hpp"
+#include "linkwise/simulate/work.hpp"
 
 namespace linkwise {
 
@@ -52,8 +54,16 @@ class Simulation : private OdeSystem {
   void start(double t0, const Start& start);
 
   /// Steps until t is covered, then writes the sample there, NaN for members that have ended. False
-  /// when all have: see ending().
+  /// when all have: see ending(). Works are known where the first sample after the start asks for
+  /// one, else NaN.
   bool advance(double t, const Sample& sample);
+
+  /// From the next start on, keeps the extremes between samples; directions: those of Extremes.
+  void keep_extremes(std::vector<double> directions) { directions_ = std::move(directions); }
+  const std::vector<double>& directions() const { return directions_; }
+  bool keeps_extremes() const { return !extremes_.empty(); }
+  /// Of one member until the last time that was advanced to, Extremes::size() numbers.
+  std::vector<double> extremes(size_t member = 0);
 
   const Ending& ending(size_t member = 0) const { return endings_[member]; }
   SimulationStatistics statistics() const;
@@ -118,6 +128,13 @@ class Simulation : private OdeSystem {
   bool any_ended() const;
   bool reach(double t);
   bool end_all(const Ending& ending);
+  void interpolate(double t);
+  void add_work_of_step();
+  void add_step_to_extremes();
+  void interpolate_step(double t);
+  void add_step(size_t member, double t, bool breaks, Extremes& to) const;
+  int nodes_of_work() const;
+  void powers(double t, double* out);
   bool write_sample(double t, const Sample& sample);
   void check_sample(double t, size_t member, const Sample& sample);
   void add_holding_torques();
@@ -129,12 +146,18 @@ class Simulation : private OdeSystem {
   std::optional<StepLimits> step_limits_;
   /// Of one member; loads at output times are computed apart, to the fixed tolerance.
   std::unique_ptr<DynamicsMethod> method_, output_method_;
-  std::unique_ptr<DynamicsMethod> aside_method_;       ///< made when first needed
+  std::unique_ptr<DynamicsMethod> aside_method_, work_method_;  ///< made when first needed
   std::unique_ptr<SolverTolerance> solver_tolerance_;  ///< of one member; null: a fixed one
   std::unique_ptr<BatchEvaluator> lanes_;              ///< of several
   std::unique_ptr<BatchEvaluator> inverse_;            ///< made when first needed
   std::unique_ptr<Integrator> integrator_;
   std::unique_ptr<IntegratedState> state_;
+  std::optional<WorkIntegral> work_;
+  bool work_is_done_ = false;
+  std::vector<double> directions_, middle_;
+  std::vector<Extremes> extremes_;  ///< of each member; none: not kept
+  double extremes_until_ = 0, advanced_to_ = 0;
+  bool sampled_ = false;  ///< since the start
   /// Rows per member: state, that of an evaluation, given accelerations, samples.
   std::vector<double> y_, evaluated_, given_, du_, loads_, total_;
   std::vector<double> start_;  ///< positions there

@@ -78,7 +78,8 @@ def test_subsets_are_the_same_numbers(chain):
         q0=bend(chain),
         record=lw.Recording(quantities=["joint_load", "velocity"], joints=["joint_3", "joint_1"]),
     )
-    assert set(part.dataset.data_vars) == {"joint_load", "velocity"}
+    timed = {name for name, variable in part.dataset.data_vars.items() if "time" in variable.dims}
+    assert timed == {"joint_load", "velocity"}
     kept = ["joint_1", "joint_3"]
     for name in ("joint_load", "velocity"):
         xr.testing.assert_equal(part[name], whole[name].sel(joint=kept))

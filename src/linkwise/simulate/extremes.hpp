@@ -1,0 +1,123 @@
+#pragma once
+// The extremes of what a simulation records, between its samples too.
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "linkwise/dynamics/batch.hpp"
+#include "linkwise/simulate/applied_forces.hpp"
+
+namespace linkwise {
+
+/// Of one member: least and largest values of every load component, of the quantities derived from
+/// loads, of positions, velocities, accelerations and drive torques, over all steps.
+///
+/// The end of every step is looked at. Where a parabola through neighbours says that a step may
+/// hold more than what was found so far, its middle is looked at as well, and so on inward. States
+/// come from the integrator; loads are those of the articulated-body method in SIMD lanes, so that
+/// a look costs a fraction of an evaluation. What is found depends on the steps alone.
+class Extremes {
+ public:
+  /// Of the load of each joint, in this order: lengths of force and moment, their parts along and
+  /// across the joint's axis, and the power of its drive.
+  enum Derived { force, axial, radial, moment, tilting_moment, torque, drive_power, n_derived };
+
+  /// The setup must outlive this. constant: torques [nv] beside the drives, or null; directions:
+  /// of the joints' axes in the joint frames [n_joints][3], NaN where there is no single one.
+  Extremes(const Setup& setup, const double* constant, std::span<const double> directions);
+
+  void begin(double t, const double* q, const double* v);
+  /// A step from time() to t, and the state in its middle. breaks: the system takes another course
+  /// at t.
+  void add_step(const double* q_middle, const double* v_middle, double t, const double* q,
+                const double* v, bool breaks);
+  /// Until where steps were added.
+  double time() const { return time_; }
+
+  /// What was found until time(): see size().
+  std::vector<double> found() const;
+  /// Per value, in the order [derived][joint], [joint][6], [nq], [nv] of velocities, accelerations
+  /// and drive torques: the minimum, its time, a bound on what it may have been between looks, and
+  /// the same of the maximum, as six rows. Then the whole load at the minimum and at the maximum
+  /// of each derived quantity, [2][derived][joint][6]. NaN where a joint has no single axis.
+  static size_t size(const Model& model) {
+    return 6 * width(model) + 12 * n_derived * joints(model);
+  }
+
+ private:
+  /// States and what was found there, row by row.
+  struct Points {
+    std::vector<double> t, q, v, a, values;
+  };
+  /// What is evaluated together.
+  struct Systems {
+    std::vector<double> q, v, tau, drive, given, external, du, loads, total;
+    void resize(size_t n, size_t nq, size_t nv, size_t n_load);
+    void repeat(size_t from, size_t to, size_t nq, size_t nv, size_t n_load);
+  };
+  /// The end of a step.
+  struct End {
+    size_t row;
+    std::vector<double> middle;  ///< state in the middle of the step; empty: no step leads here
+    bool apart() const { return middle.empty(); }
+  };
+  struct Interval {
+    size_t left, middle, right;  ///< rows; the middle one was not looked at yet
+    std::vector<size_t> values;  ///< that may go beyond their extremes
+  };
+  struct Bend {
+    double a, b;
+  };
+  /// A value that an interval may bring beyond its extremes.
+  struct Near {
+    size_t value;
+    double up, down;
+  };
+  /// All values at their extremes: when, what may have been between looks, the loads then.
+  struct Extreme {
+    std::vector<double> value, time, reach, wrench;
+  };
+
+  static size_t joints(const Model& model) { return static_cast<size_t>(model.n_joints()); }
+  static size_t width(const Model& model) {
+    return (n_derived + 6) * joints(model) + static_cast<size_t>(model.nq()) +
+           3 * static_cast<size_t>(model.nv());
+  }
+
+  size_t append(double t, const double* q, const double* v);
+  size_t append_given(size_t left, size_t right, const std::vector<double>& state);
+  size_t append_middle(size_t left, size_t right);
+  void evaluate(std::span<const size_t> rows);
+  void write_values(size_t row, const double* loads, const double* drive);
+  void keep(size_t row);
+  void measure();
+  void digest(bool all);
+  void search_inside(std::vector<Interval> open);
+  void find_near(size_t left, size_t right, std::span<const size_t> neighbours);
+  void find_near(size_t left, size_t right, size_t other, const std::vector<size_t>& values);
+  Bend bend_of(size_t left, size_t right, size_t other) const;
+  void add_near(size_t value, double a, double b, double bulge_up, double bulge_down);
+  bool is_worth_a_search() const;
+  void leave_open();
+  std::vector<size_t> near_values() const;
+  void forget();
+  template <class F>
+  void for_chunks(F&& f) const;
+
+  const Setup* setup_;
+  const Model* model_;
+  AppliedForces forces_;
+  std::shared_ptr<BatchEvaluator> dynamics_, inverse_;
+  std::vector<double> directions_;
+  size_t width_, block_;
+  double time_ = 0;
+  Points points_;
+  Systems systems_;
+  std::vector<End> ends_;
+  size_t seen_ = 0, judged_ = 0;  ///< ends that were looked at, that begin an interval judged
+  Extreme least_, largest_;
+  std::vector<double> margin_;
+  std::vector<Near> near_;
+};
+
+}  // namespace linkwise

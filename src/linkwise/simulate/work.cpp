@@ -1,0 +1,130 @@
+#include "linkwise/simulate/work.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "linkwise/forces/passive.hpp"
+#include "linkwise/kinematics/frame_motion.hpp"
+
+namespace linkwise {
+namespace {
+
+struct Rule {
+  std::array<double, WorkIntegral::most_nodes> nodes{}, weights{};  ///< on [-1, 1]
+};
+
+/// Legendre polynomials of degree 0 to n at x.
+std::array<double, WorkIntegral::most_nodes + 1> legendre(int n, double x) {
+  std::array<double, WorkIntegral::most_nodes + 1> p{1, x};
+  for (int k = 2; k <= n; ++k) p[k] = ((2 * k - 1) * x * p[k - 1] - (k - 1) * p[k - 2]) / k;
+  return p;
+}
+
+/// Gauss-Legendre, by Newton's method from Chebyshev's nodes.
+Rule gauss_legendre(int n) {
+  Rule rule;
+  for (int i = 0; i < n; ++i) {
+    double x = -std::cos(std::numbers::pi * (i + 0.75) / (n + 0.5)), slope = 1;
+    for (int iteration = 0; iteration < 20; ++iteration) {
+      const auto p = legendre(n, x);
+      slope = n * (x * p[n] - p[n - 1]) / (x * x - 1);
+      x -= p[n] / slope;
+    }
+    rule.nodes[i] = x;
+    rule.weights[i] = 2 / ((1 - x * x) * slope * slope);
+  }
+  return rule;
+}
+
+const Rule& rule_of(int n) {
+  static const auto rules = [] {
+    std::array<Rule, WorkIntegral::most_nodes + 1> all;
+    for (int k = 1; k <= WorkIntegral::most_nodes; ++k) all[k] = gauss_legendre(k);
+    return all;
+  }();
+  return rules[n];
+}
+
+/// Power of what the joints' damping, friction and the damping of stops do. Springs and stops at
+/// rest store what they take.
+double passive_power(const Model& model, const double* q, const double* v) {
+  if (!model.has_passive_forces()) return 0;
+  const size_t n = model.nv();
+  std::vector<double> moving(n), resting(n);
+  const std::vector<double> rest(n);
+  add_passive_forces(model, q, v, moving.data());
+  add_passive_forces(model, q, rest.data(), resting.data());
+  double power = 0;
+  for (size_t i = 0; i < n; ++i) power += (moving[i] - resting[i]) * v[i];
+  return power;
+}
+
+double external_power(const Model& model, const double* external, const double* q,
+                      const double* v) {
+  if (!external) return 0;
+  double power = 0;
+  for (int j = 0; j < model.n_joints(); ++j) {
+    const double* wrench = external + 6 * j;
+    if (std::all_of(wrench, wrench + 6, [](double x) { return x == 0; })) continue;
+    const Motion<double> rate = frame_motion(model, q, v, nullptr, {.joint = j}).velocity;
+    const double rates[6] = {rate.lin.x, rate.lin.y, rate.lin.z,
+                             rate.ang.x, rate.ang.y, rate.ang.z};
+    power += std::inner_product(wrench, wrench + 6, rates, 0.0);
+  }
+  return power;
+}
+
+}  // namespace
+
+WorkIntegral::WorkIntegral(const Model& model, size_t members, double t0)
+    : width_(width(model)),
+      begin_(t0),
+      end_(t0),
+      at_begin_(members * width_),
+      at_end_(members * width_),
+      until_(members * width_) {}
+
+void WorkIntegral::add_step(double t, int nodes, const Powers& powers) {
+  begin_ = end_;
+  end_ = t;
+  nodes_ = std::clamp(nodes, 1, most_nodes);
+  powers_.resize(nodes_ * at_end_.size());
+  const Rule& rule = rule_of(nodes_);
+  for (int k = 0; k < nodes_; ++k)
+    powers(begin_ + (end_ - begin_) * (1 + rule.nodes[k]) / 2, powers_.data() + k * at_end_.size());
+  at_begin_ = at_end_;
+  add(1, at_end_);
+}
+
+void WorkIntegral::reach(double t) {
+  until_ = t == end_ ? at_end_ : at_begin_;
+  if (t != end_) add((t - begin_) / (end_ - begin_), until_);
+}
+
+/// The integral of the polynomial through the powers, whose sum of Legendre polynomials P_k has
+/// coefficients (2 k + 1) / 2 times the sum of weight P_k(node) power over the nodes; that of P_k
+/// from -1 to x is (P_k+1(x) - P_k-1(x)) / (2 k + 1).
+void WorkIntegral::add(double fraction, std::vector<double>& works) const {
+  const Rule& rule = rule_of(nodes_);
+  const auto at = legendre(nodes_, 2 * fraction - 1);
+  for (int j = 0; j < nodes_; ++j) {
+    const auto at_node = legendre(nodes_, rule.nodes[j]);
+    double share = at[1] + 1;
+    for (int k = 1; k < nodes_; ++k) share += at_node[k] * (at[k + 1] - at[k - 1]);
+    const double factor = (end_ - begin_) * rule.weights[j] * share / 4;
+    for (size_t i = 0; i < works.size(); ++i) works[i] += factor * powers_[j * works.size() + i];
+  }
+}
+
+void write_powers(const Model& model, const AppliedForces& forces, size_t member, const double* q,
+                  const double* v, double* powers) {
+  const size_t n = model.nv();
+  for (size_t i = 0; i < n; ++i) powers[i] = forces.drive(member)[i] * v[i];
+  powers[n] = external_power(model, forces.external(member), q, v);
+  powers[n + 1] = -passive_power(model, q, v);
+}
+
+}  // namespace linkwise

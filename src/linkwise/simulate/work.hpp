@@ -1,0 +1,48 @@
+#pragma once
+// The works that go into and out of a machine, integrated along the integrator's steps.
+#include <functional>
+#include <vector>
+
+#include "linkwise/simulate/applied_forces.hpp"
+
+namespace linkwise {
+
+/// Works since the start, per member: of the drives, one per rate; then of the external wrenches;
+/// then what damping and friction took away. J.
+///
+/// Powers are evaluated at the Gauss-Legendre nodes of every step, from the dense output. Their
+/// quadrature is the work of the step; the polynomial through them gives that until a time within
+/// it. So no work depends on the times at which it is asked for.
+class WorkIntegral {
+ public:
+  /// Writes the powers at a time within the last step [members][width], in the order of the works.
+  using Powers = std::function<void(double t, double* powers)>;
+  static constexpr int most_nodes = 13;
+
+  static size_t width(const Model& model) { return static_cast<size_t>(model.nv()) + 2; }
+
+  WorkIntegral(const Model& model, size_t members, double t0);
+
+  /// The last step ended at t. nodes: quadrature is exact for powers of degree 2 nodes - 1 in time,
+  /// works within the step for those of degree nodes - 1.
+  void add_step(double t, int nodes, const Powers& powers);
+  /// Works until t within the last step.
+  void reach(double t);
+
+  const double* of(size_t member) const { return until_.data() + member * width_; }
+
+ private:
+  void add(double fraction, std::vector<double>& works) const;
+
+  size_t width_;
+  double begin_, end_;  ///< of the last step
+  int nodes_ = 0;       ///< in the last step
+  /// At the begin and the end of the last step, and at the time asked for last; powers by node.
+  std::vector<double> at_begin_, at_end_, until_, powers_;
+};
+
+/// The powers of one member whose forces were evaluated, [width].
+void write_powers(const Model& model, const AppliedForces& forces, size_t member, const double* q,
+                  const double* v, double* powers);
+
+}  // namespace linkwise

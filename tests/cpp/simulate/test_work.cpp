@@ -1,0 +1,50 @@
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "linkwise/simulate/work.hpp"
+#include "simulate/recording.hpp"
+
+namespace linkwise::testing {
+namespace {
+
+TEST(WorkIntegral, IsExactForPolynomials) {
+  const auto model = make_model(pendulum());
+  for (int nodes = 1; nodes <= WorkIntegral::most_nodes; ++nodes) {
+    const int whole = 2 * nodes - 1, part = nodes - 1;
+    const auto powers = [&](double t, double* out) {
+      out[0] = std::pow(t, whole);
+      out[1] = std::pow(t, part);
+      out[2] = 1;
+    };
+    const auto exact = [](double t, int degree) { return std::pow(t, degree + 1) / (degree + 1); };
+    WorkIntegral work(*model, 1, 0);
+    work.add_step(0.5, nodes, powers);
+    work.add_step(2, nodes, powers);
+    work.reach(1.25);
+    EXPECT_NEAR(work.of(0)[1], exact(1.25, part), 1e-12 * exact(2, part)) << nodes;
+    EXPECT_NEAR(work.of(0)[2], 1.25, 1e-14);
+    work.reach(2);
+    EXPECT_NEAR(work.of(0)[0], exact(2, whole), 1e-12 * exact(2, whole)) << nodes;
+    EXPECT_NEAR(work.of(0)[1], exact(2, part), 1e-12 * exact(2, part)) << nodes;
+  }
+}
+
+TEST(WorkIntegral, DoesNotDependOnTheTimesAskedFor) {
+  const auto model = make_model(pendulum());
+  const auto powers = [](double t, double* out) {
+    for (int i = 0; i < 3; ++i) out[i] = std::exp(std::sin((i + 7) * t));
+  };
+  WorkIntegral once(*model, 1, 0), often(*model, 1, 0);
+  for (int step = 1; step <= 5; ++step) {
+    once.add_step(step, 5, powers);
+    often.add_step(step, 5, powers);
+    for (double t = step - 0.9; t < step; t += 0.1) often.reach(t);
+  }
+  once.reach(4.7);
+  often.reach(4.7);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(once.of(0)[i], often.of(0)[i]);
+}
+
+}  // namespace
+}  // namespace linkwise::testing
