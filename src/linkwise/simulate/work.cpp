@@ -12,6 +12,14 @@
 namespace linkwise {
 namespace {
 
+/// Against the largest power in a step: far below what integration to usual tolerances leaves.
+constexpr double halving_tolerance = 1e-12;
+/// A kink in the powers, where a motion is put together from pieces, is closed in until what is
+/// missed no longer counts.
+constexpr int most_halvings = 24;
+/// Per step, of motions that are rough everywhere.
+constexpr size_t most_pieces = 1024;
+
 struct Rule {
   std::array<double, WorkIntegral::most_nodes> nodes{}, weights{};  ///< on [-1, 1]
 };
@@ -83,39 +91,86 @@ WorkIntegral::WorkIntegral(const Model& model, size_t members, double t0)
     : width_(width(model)),
       begin_(t0),
       end_(t0),
-      at_begin_(members * width_),
       at_end_(members * width_),
       until_(members * width_) {}
 
 void WorkIntegral::add_step(double t, int nodes, const Powers& powers) {
   begin_ = end_;
   end_ = t;
-  nodes_ = std::clamp(nodes, 1, most_nodes);
-  powers_.resize(nodes_ * at_end_.size());
+  nodes_ = std::clamp(nodes > 0 ? nodes : most_nodes, 1, most_nodes);
+  pieces_.clear();
+  Piece whole = piece(begin_, end_, powers);
+  if (nodes > 0)
+    pieces_.push_back(std::move(whole));
+  else
+    halve(std::move(whole), most_halvings, powers);
+  for (Piece& part : pieces_) {
+    part.at_begin = at_end_;
+    add(part, 1, at_end_);
+  }
+}
+
+WorkIntegral::Piece WorkIntegral::piece(double begin, double end, const Powers& powers) const {
+  Piece made{begin, end, std::vector<double>(nodes_ * at_end_.size()), {}};
   const Rule& rule = rule_of(nodes_);
   for (int k = 0; k < nodes_; ++k)
-    powers(begin_ + (end_ - begin_) * (1 + rule.nodes[k]) / 2, powers_.data() + k * at_end_.size());
-  at_begin_ = at_end_;
-  add(1, at_end_);
+    powers(begin + (end - begin) * (1 + rule.nodes[k]) / 2,
+           made.powers.data() + k * at_end_.size());
+  return made;
+}
+
+void WorkIntegral::halve(Piece whole, int depth, const Powers& powers) {
+  const double middle = whole.begin + (whole.end - whole.begin) / 2;
+  Piece left = piece(whole.begin, middle, powers), right = piece(middle, whole.end, powers);
+  if (depth == 0 || pieces_.size() >= most_pieces || adds_up(whole, left, right)) {
+    pieces_.push_back(std::move(left));
+    pieces_.push_back(std::move(right));
+    return;
+  }
+  halve(std::move(left), depth - 1, powers);
+  halve(std::move(right), depth - 1, powers);
+}
+
+/// Of each member, against the largest of its works in the step. True for NaN, which no halving
+/// cures.
+bool WorkIntegral::adds_up(const Piece& whole, const Piece& left, const Piece& right) const {
+  const size_t n = at_end_.size();
+  std::vector<double> one(n), two(n);
+  add(whole, 1, one);
+  add(left, 1, two);
+  add(right, 1, two);
+  double largest = 0;
+  for (const double power : whole.powers) largest = std::max(largest, std::abs(power));
+  for (size_t i = 0; i < n; ++i)
+    if (std::abs(one[i] - two[i]) > halving_tolerance * (end_ - begin_) * largest) return false;
+  return true;
 }
 
 void WorkIntegral::reach(double t) {
-  until_ = t == end_ ? at_end_ : at_begin_;
-  if (t != end_) add((t - begin_) / (end_ - begin_), until_);
+  if (t == end_ || pieces_.empty()) {
+    until_ = at_end_;
+    return;
+  }
+  const auto after = [t](const Piece& part) { return t < part.end; };
+  const auto found = std::find_if(pieces_.begin(), pieces_.end(), after);
+  const Piece& part = found == pieces_.end() ? pieces_.back() : *found;
+  until_ = part.at_begin;
+  add(part, (t - part.begin) / (part.end - part.begin), until_);
 }
 
 /// The integral of the polynomial through the powers, whose sum of Legendre polynomials P_k has
 /// coefficients (2 k + 1) / 2 times the sum of weight P_k(node) power over the nodes; that of P_k
 /// from -1 to x is (P_k+1(x) - P_k-1(x)) / (2 k + 1).
-void WorkIntegral::add(double fraction, std::vector<double>& works) const {
+void WorkIntegral::add(const Piece& piece, double fraction, std::vector<double>& works) const {
   const Rule& rule = rule_of(nodes_);
   const auto at = legendre(nodes_, 2 * fraction - 1);
   for (int j = 0; j < nodes_; ++j) {
     const auto at_node = legendre(nodes_, rule.nodes[j]);
     double share = at[1] + 1;
     for (int k = 1; k < nodes_; ++k) share += at_node[k] * (at[k + 1] - at[k - 1]);
-    const double factor = (end_ - begin_) * rule.weights[j] * share / 4;
-    for (size_t i = 0; i < works.size(); ++i) works[i] += factor * powers_[j * works.size() + i];
+    const double factor = (piece.end - piece.begin) * rule.weights[j] * share / 4;
+    for (size_t i = 0; i < works.size(); ++i)
+      works[i] += factor * piece.powers[j * works.size() + i];
   }
 }
 

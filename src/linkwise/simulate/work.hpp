@@ -12,7 +12,8 @@ namespace linkwise {
 ///
 /// Powers are evaluated at the Gauss-Legendre nodes of every step, from the dense output. Their
 /// quadrature is the work of the step; the polynomial through them gives that until a time within
-/// it. So no work depends on the times at which it is asked for.
+/// it. So no work depends on the times at which it is asked for. Where the step says nothing about
+/// how fast powers change, it is halved until halves add up to the whole.
 class WorkIntegral {
  public:
   /// Writes the powers at a time within the last step [members][width], in the order of the works.
@@ -24,7 +25,7 @@ class WorkIntegral {
   WorkIntegral(const Model& model, size_t members, double t0);
 
   /// The last step ended at t. nodes: quadrature is exact for powers of degree 2 nodes - 1 in time,
-  /// works within the step for those of degree nodes - 1.
+  /// works within the step for those of degree nodes - 1; 0: the step is halved where it must be.
   void add_step(double t, int nodes, const Powers& powers);
   /// Works until t within the last step.
   void reach(double t);
@@ -32,13 +33,22 @@ class WorkIntegral {
   const double* of(size_t member) const { return until_.data() + member * width_; }
 
  private:
-  void add(double fraction, std::vector<double>& works) const;
+  /// A part of the last step, with the works at its begin.
+  struct Piece {
+    double begin, end;
+    std::vector<double> powers;  ///< by node
+    std::vector<double> at_begin;
+  };
+  Piece piece(double begin, double end, const Powers& powers) const;
+  void halve(Piece whole, int depth, const Powers& powers);
+  bool adds_up(const Piece& whole, const Piece& left, const Piece& right) const;
+  void add(const Piece& piece, double fraction, std::vector<double>& works) const;
 
   size_t width_;
-  double begin_, end_;  ///< of the last step
-  int nodes_ = 0;       ///< in the last step
-  /// At the begin and the end of the last step, and at the time asked for last; powers by node.
-  std::vector<double> at_begin_, at_end_, until_, powers_;
+  double begin_, end_;                  ///< of the last step
+  int nodes_ = 0;                       ///< per piece of it
+  std::vector<Piece> pieces_;           ///< of it, in order
+  std::vector<double> at_end_, until_;  ///< works at its end, and at the time asked for last
 };
 
 /// The powers of one member whose forces were evaluated, [width].
