@@ -1,0 +1,50 @@
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "linkwise/simulate/extremes.hpp"
+#include "simulate/recording.hpp"
+
+namespace linkwise::testing {
+namespace {
+
+constexpr double let_go = 1.5;
+
+std::vector<double> extremes_until(double end, int samples, SimulationOptions options) {
+  Simulation simulation(make_model(pendulum()), std::move(options));
+  simulation.keep_extremes({0, 1, 0});
+  const double q = let_go, v = 0;
+  simulation.start(0, {&q, &v});
+  for (int k = 1; k <= samples; ++k) EXPECT_TRUE(simulation.advance(end * k / samples, Sample()));
+  return simulation.extremes();
+}
+
+// Of a pendulum let go at an angle a, the rod carries m g (3 - 2 cos a) at the bottom.
+TEST(Extremes, AreFoundBetweenSamples) {
+  const auto model = make_model(pendulum());
+  const size_t width = (Extremes::size(*model) - 12 * Extremes::n_derived) / 6;
+  const double bottom = 9.81 * (3 - 2 * std::cos(let_go));
+  for (const std::string_view kind : all_kinds()) {
+    const auto found = extremes_until(2, 1, fixed_step(1e-2, kind));
+    ASSERT_EQ(found.size(), Extremes::size(*model));
+    const double* maximum = found.data() + 3 * width;
+    const double room = kind == "semi_implicit_euler" ? 0.05 * bottom : 1e-3 * bottom;
+    EXPECT_NEAR(maximum[Extremes::force], bottom, room) << kind;
+    EXPECT_NEAR(maximum[Extremes::radial], bottom, room) << kind;
+    EXPECT_NEAR(maximum[Extremes::axial], 0, 1e-9) << kind;
+    EXPECT_GE(maximum[2 * width], maximum[0]) << kind;  // its reach
+    const double* position = found.data() + 13;
+    EXPECT_LT(position[0], -0.8 * let_go) << kind;
+  }
+}
+
+TEST(Extremes, DoNotDependOnTheTimesAskedFor) {
+  for (const std::string_view kind : all_kinds()) {
+    const auto once = extremes_until(2, 1, fixed_step(1e-2, kind));
+    const auto often = extremes_until(2, 777, fixed_step(1e-2, kind));
+    for (size_t i = 0; i < once.size(); ++i) EXPECT_EQ(once[i], often[i]) << kind << ' ' << i;
+  }
+}
+
+}  // namespace
+}  // namespace linkwise::testing
