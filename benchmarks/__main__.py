@@ -16,6 +16,7 @@ STUDIES = (
     "iterations",
     "stop_tests",
     "stiff_machines",
+    "error_bounds",
     "publish",
 )
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <initializer_list>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -170,6 +171,13 @@ class ArrayIn {
   nb::object owner_;
 };
 
+/// Are all of them numbers? Of results too: sums and products of large inputs overflow.
+inline bool is_finite(const double* data, size_t n) {
+  bool finite = true;
+  for (size_t i = 0; i < n; ++i) finite &= data[i] - data[i] == 0;
+  return finite;
+}
+
 /// What an array holds that is no real number, by the kind of its dtype; null for real numbers.
 inline const char* unreal_values(char kind) {
   switch (kind) {
@@ -195,21 +203,35 @@ inline const char* unreal_values(char kind) {
   }
 }
 
+/// Is an entry of a list, or of lists within it, NumPy's constant for a masked value? NumPy would
+/// make a NaN of it.
+inline bool holds_masked(nb::handle value, size_t depth = 0) {
+  if (depth > Shape::max_axes) return false;
+  PyObject* const o = value.ptr();
+  if (!PyList_CheckExact(o) && !PyTuple_CheckExact(o))
+    return std::string_view(Py_TYPE(o)->tp_name) == "MaskedConstant";
+  for (Py_ssize_t i = 0; i < PySequence_Fast_GET_SIZE(o); ++i)
+    if (holds_masked(PySequence_Fast_GET_ITEM(o, i), depth + 1)) return true;
+  return false;
+}
+
 /// `value` as an array of float64. Whatever else NumPy would turn into numbers is refused: it would
 /// drop imaginary parts and masks, and read texts and dates.
 inline ArrayIn as_array(nb::handle value, const char* name) {
   ArrayIn array;
   if (array.open(value)) return array;
-  const char* found = nullptr;
+  const char* found = holds_masked(value) ? "masked values" : nullptr;
   try {
-    const nb::object given = numpy("asarray")(value);
-    if (PyObject_TypeCheck(value.ptr(), numpy_table.array_type) &&
-        nb::cast<bool>(python_function("numpy.ma", "is_masked")(value)))
-      found = "masked values";
-    else
-      found = unreal_values(reinterpret_cast<const NumpyArray*>(given.ptr())->descr->kind);
-    if (!found && array.open(numpy("array")(given, "dtype"_a = "float64", "order"_a = "C")))
-      return array;
+    if (!found) {
+      const nb::object given = numpy("asarray")(value);
+      if (PyObject_TypeCheck(value.ptr(), numpy_table.array_type) &&
+          nb::cast<bool>(python_function("numpy.ma", "is_masked")(value)))
+        found = "masked values";
+      else
+        found = unreal_values(reinterpret_cast<const NumpyArray*>(given.ptr())->descr->kind);
+      if (!found && array.open(numpy("array")(given, "dtype"_a = "float64", "order"_a = "C")))
+        return array;
+    }
   } catch (nb::python_error& error) {
     if (error.matches(PyExc_MemoryError)) throw;
   }
@@ -318,14 +340,6 @@ struct NewArray {
     data = reinterpret_cast<double*>(reinterpret_cast<NumpyArray*>(array.ptr())->data);
   }
 };
-
-/// Whether a result holds numbers alone. Inputs were checked, but sums and products of large ones
-/// overflow.
-inline bool is_finite(const double* data, size_t n) {
-  bool finite = true;
-  for (size_t i = 0; i < n; ++i) finite &= data[i] - data[i] == 0;
-  return finite;
-}
 
 /// What only describes an object: writing into it would change a copy without a word, and is
 /// refused.

@@ -147,7 +147,7 @@ nb::list integrator_list() {
 
 /// What pickling keeps of a report.
 using ReportState =
-    std::tuple<int, std::string, std::string, std::string, int, std::string, int, double>;
+    std::tuple<int, std::string, std::string, std::string, int, std::string, int, double, bool>;
 
 ReportState state_of(const EvaluationReport& r) {
   return {static_cast<int>(r.outcome),
@@ -157,14 +157,15 @@ ReportState state_of(const EvaluationReport& r) {
           r.body,
           r.body_name,
           r.iterations,
-          r.error_estimate};
+          r.error_estimate,
+          r.error_is_bound};
 }
 
 EvaluationReport report_of(const ReportState& state) {
   EvaluationReport r;
   int outcome = 0;
   std::tie(outcome, r.choice.method, r.choice.solver, r.choice.reason, r.body, r.body_name,
-           r.iterations, r.error_estimate) = state;
+           r.iterations, r.error_estimate, r.error_is_bound) = state;
   r.outcome = static_cast<Outcome>(outcome);
   return r;
 }
@@ -192,7 +193,11 @@ void bind_results(nb::module_& m) {
       .def_ro("iterations", &EvaluationReport::iterations,
               "Iterations of the linear solver; 0 of a direct one.")
       .def_ro("error_estimate", &EvaluationReport::error_estimate,
-              "Estimated error of the constraint forces in the A-norm, relative to them.")
+              "Error of the constraint forces in the A-norm, relative to them, as far as it is "
+              "known.")
+      .def_ro("error_is_bound", &EvaluationReport::error_is_bound,
+              "Whether error_estimate is a bound, up to rounding, and not an estimate that may "
+              "have missed a slow mode.")
       .def("__getstate__", &state_of)
       .def("__setstate__",
            [](EvaluationReport& r, const ReportState& state) {

@@ -58,6 +58,7 @@ void bind_forces(nb::module_& m) {
         without_gil([&](const GoOn& go_on) {
           self.evaluator.mass_matrix(s.count, s.q.data, executor, H.data, go_on);
         });
+        check_result(H.data, s.count * nv * nv);
         return H.array;
       },
       "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),

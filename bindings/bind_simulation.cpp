@@ -130,7 +130,10 @@ void bind_ending(nb::module_& m) {
   nb::class_<SimulationStatistics>(m, "SimulationStatistics", "Since the start.")
       .def_ro("steps", &SimulationStatistics::steps)
       .def_ro("evaluations", &SimulationStatistics::evaluations)
-      .def_ro("iterations", &SimulationStatistics::iterations);
+      .def_ro("iterations", &SimulationStatistics::iterations)
+      .def_ro("solver_error", &SimulationStatistics::solver_error,
+              "Largest error that the forces of an iterative solver can have had, in the A-norm "
+              "and relative to them; infinite where it is not bounded.");
 }
 
 int traverse(PyObject* self, visitproc visit, void* arg) {

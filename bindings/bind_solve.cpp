@@ -15,6 +15,8 @@
 #include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/forces/passive.hpp"
 #include "linkwise/linear/triplets.hpp"
+#include "linkwise/simulate/given_motion.hpp"
+#include "linkwise/solve/checked_solver.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "linkwise/solve/spectrum.hpp"
 #include "numbers.hpp"
@@ -54,6 +56,7 @@ struct StateRows {
     count = product(lead);
     total_tau.assign(count * m.nv(), 0.0);
     for (size_t i = 0; i < count; ++i) {
+      check_quaternions(m, q.data + i * m.nq());
       double* row = total_tau.data() + i * m.nv();
       if (tau.given) std::copy(tau.data + i * m.nv(), tau.data + (i + 1) * m.nv(), row);
       if (passive)
@@ -86,12 +89,15 @@ class PyConstraintSystem {
     add_armature_bias(*model_, v_.data(), -1, tau_.data());
     if (in.external) keep(external_, in.external, 6 * model_->n_joints());
     system_.assemble(input());
+    check_result(b().data(), b().size());
+    if (!A().all_finite()) refuse_result();
   }
 
   const BlockTree& A() const { return system_.A(); }
   const Model& model() const { return *model_; }
 
-  nb::object right_hand_side() const { return read_only(to_numpy(system_.b())); }
+  const std::vector<double>& b() const { return system_.b(); }
+  nb::object right_hand_side() const { return read_only(to_numpy(b())); }
 
   std::vector<double> unknowns(nb::handle value, const char* name) const {
     const Argument given(name, {size(A().size())}, value);
@@ -104,6 +110,7 @@ class PyConstraintSystem {
   nb::object multiply(nb::handle x) const {
     std::vector<double> y(A().size());
     A().multiply(unknowns(x, "f"), y);
+    check_result(y.data(), y.size());
     return to_numpy(y);
   }
 
@@ -113,6 +120,7 @@ class PyConstraintSystem {
     A().multiply(f, y);
     double sum = 0;
     for (size_t i = 0; i < f.size(); ++i) sum += f[i] * y[i];
+    check_result(&sum, 1);
     return std::sqrt(std::max(0.0, sum));
   }
 
@@ -131,19 +139,24 @@ class PyConstraintSystem {
   nb::object sparse() const;
 
   nb::tuple solve(const std::string& solver, nb::handle guess, double tolerance,
-                  const std::string& stop, int max_iterations, nb::handle solver_options) const {
+                  const std::string& stop, int max_iterations, nb::handle solver_options) {
     DynamicsOptions options;
     options.solver_options.tolerance = tolerance;
     options.solver_options.stop = stop_rule_from_name(stop);
     options.solver_options.max_iterations = max_iterations;
     set_options(options.solver_options, solver_option_values(solver_options));
-    const auto made = make_solver(solver, options.solver_options);
+    CheckedSolver made(solver, options.solver_options, false);
     std::vector<double> f =
         guess.is_none() ? std::vector<double>(A().size()) : unknowns(guess, "guess");
     Report report;
     {
       const GilReleased released;
-      report = made->solve(A(), system_.b(), f);
+      std::vector<double> du(model_->nv());
+      report = made.solve(A(), system_.b(), f, [&](bool with_size) {
+        TreeSystem::Distance found{.with_size = with_size};
+        if (!made.is_direct()) system_.recover(input(), f, du.data(), nullptr, &found);
+        return MotionError{found.gap, found.size};
+      });
     }
     const Choice choice{"constraint_force", solver, "as asked for"};
     const int body = report.node >= 0 ? system_.body_of_node(report.node) : -1;
@@ -153,6 +166,8 @@ class PyConstraintSystem {
   nb::tuple recover(nb::handle f) {
     NewArray du({size(model_->nv())}, {}), loads({size(model_->n_joints()), 6}, {});
     system_.recover(input(), unknowns(f, "f"), du.data, loads.data);
+    check_result(du.data, size(model_->nv()));
+    check_result(loads.data, size(6 * model_->n_joints()));
     return nb::make_tuple(du.array, loads.array);
   }
 
@@ -223,6 +238,9 @@ class PyDynamicsMethod {
     {
       const GilReleased released;
       report = method_->evaluate(t, rows.input(m, 0), du.data, loads.data);
+      if (report.ok() &&
+          !(is_finite(du.data, size(m.nv())) && is_finite(loads.data, size(6 * m.n_joints()))))
+        report.outcome = Outcome::not_finite;
       if (accept && report.ok()) method_->accepted(t);
     }
     return nb::make_tuple(du.array, loads.array, evaluation_report(m, choice_, report));
@@ -249,6 +267,7 @@ nb::dict PyDynamicsMethod::follow(nb::handle times_in, nb::handle q, nb::handle 
   NewArray du({rows.count}, {size(m.nv())});
   std::vector<double> seconds, iterations, errors;
   std::vector<Outcome> outcomes;
+  bool bounds = true;
   Interrupt interrupt;
   {
     const GilReleased released;
@@ -256,11 +275,13 @@ nb::dict PyDynamicsMethod::follow(nb::handle times_in, nb::handle q, nb::handle 
     for (size_t i = 0; i < rows.count && !interrupt(); ++i) {
       const SweepInput<double> in = rows.input(m, i);
       const Clock::time_point started = Clock::now();
-      const DynamicsReport report =
-          method_->evaluate(times.data()[i], in, du.data + i * m.nv(), nullptr);
+      DynamicsReport report = method_->evaluate(times.data()[i], in, du.data + i * m.nv(), nullptr);
+      if (report.ok() && !is_finite(du.data + i * m.nv(), size(m.nv())))
+        report.outcome = Outcome::not_finite;
       seconds.push_back(seconds_since(started));
       iterations.push_back(report.iterations);
       errors.push_back(report.error_estimate);
+      bounds &= report.error_is_bound;
       outcomes.push_back(report.outcome);
       method_->accepted(times.data()[i]);
       if (seconds_since(begin) > time_limit) break;
@@ -275,6 +296,7 @@ nb::dict PyDynamicsMethod::follow(nb::handle times_in, nb::handle q, nb::handle 
   out["seconds"] = to_numpy(seconds);
   out["iterations"] = nb::cast(to_numpy(iterations)).attr("astype")("int64");
   out["error_estimate"] = to_numpy(errors);
+  out["error_is_bound"] = bounds;
   out["outcome"] = names;
   return out;
 }
@@ -301,7 +323,8 @@ nb::list stop_rule_list() {
   };
   add(StopRule::paper, "the last change, relative to the solution [sharf1993, section 5]");
   add(StopRule::residual, "the residual, relative to the right-hand side");
-  add(StopRule::energy_norm, "an estimate of the error in the A-norm, relative to the solution");
+  add(StopRule::energy_norm,
+      "the error in the A-norm, relative to the solution: estimated, then bounded");
   return out;
 }
 
@@ -475,7 +498,7 @@ Args:
 
 Returns:
     A dictionary of acceleration (n, nv) [rad/s2, m/s2], seconds, iterations, error_estimate (n,)
-    and outcome; shorter when time_limit has passed.
+    and outcome, shorter when time_limit has passed; error_is_bound is one for all.
 
 Raises:
     InputError: shapes do not fit the model or each other, or a number is not finite.)")

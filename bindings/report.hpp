@@ -12,13 +12,16 @@ struct NumericsError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+[[noreturn]] inline void refuse_result() {
+  throw NumericsError(
+      "the result is not finite; check that q, v, masses and inertias are of usual size, and "
+      "that "
+      "quaternions have unit length");
+}
+
 /// NumericsError unless a result holds numbers alone.
 inline void check_result(const double* data, size_t n) {
-  if (!is_finite(data, n))
-    throw NumericsError(
-        "the result is not finite; check that q, v, masses and inertias are of usual size, and "
-        "that "
-        "quaternions have unit length");
+  if (!is_finite(data, n)) refuse_result();
 }
 
 }  // namespace linkwise::bindings

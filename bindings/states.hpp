@@ -1,6 +1,7 @@
 #pragma once
 // States of a model with leading axes, and the work on them over threads.
 #include "interrupt.hpp"
+#include "linkwise/simulate/given_motion.hpp"
 #include "numbers.hpp"
 #include "py_model.hpp"
 
@@ -27,6 +28,7 @@ struct States {
     lead = broadcast_leading({&q, &v, &tau, &external, &prescribed});
     count = product(lead);
     if (external.given) check_external(m);
+    for (size_t i = 0; i < count; ++i) check_quaternions(m, q.data + i * m.nq());
   }
 
   /// As the core takes them; absent ones are null.

@@ -37,6 +37,38 @@ def test_scenarios_have_it(tmp_path):
     assert run.outcome == "too_many_steps"
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"duration": 1e308}, "duration: 1e.308 s given; give at most 1e.12 s"),
+        ({"times": [0, 1e300]}, "times: 1e.300 s given"),
+        (
+            {"duration": 1, "step": 5e-324, "integrator": "runge_kutta_4"},
+            "step: 4.9.*e-324 s makes",
+        ),
+        ({"duration": 1, "max_step": 1e-200}, "max_step: 1e-200 s makes more than 1e.12 steps"),
+    ],
+)
+def test_what_would_take_for_ever_is_refused(options, said):
+    with pytest.raises(lw.InputError, match=said):
+        lw.simulate(lw.scenes.chain(2), **options)
+
+
+def test_batches_refuse_it_too():
+    with pytest.raises(lw.InputError, match="step: 1e-20 s makes more than"):
+        lw.simulate_batch(lw.scenes.chain(2), duration=1, step=1e-20)
+
+
+def test_the_command_refuses_it(linkwise, tmp_path):
+    (tmp_path / "s.toml").write_text(
+        "[model.chain]\nn_bodies = 2\n[simulate]\nduration = 1e308\n"
+        'integrator = "runge_kutta_4"\nstep = 5e-324\n'
+    )
+    result = linkwise("run", "s.toml")
+    assert result.code == 2
+    assert "give at most" in result.complaint
+
+
 @pytest.mark.parametrize("steps", [0, -1, 1.5, "many", True])
 def test_bounds_that_are_none(steps):
     with pytest.raises(lw.InputError, match="max_steps"):

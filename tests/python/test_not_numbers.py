@@ -12,6 +12,7 @@ N = 2
 NOT_NUMBERS = {
     "complex numbers": np.array([0.3, 0.2]) + 5j,
     "masked values": np.ma.masked_array([0.3, 0.2], mask=[1, 0]),
+    "masked values ": [np.ma.masked, 0.2],
     "times or dates": np.array(["NaT", "NaT"], "m8[s]"),
     "times or dates ": np.array(["2020-01-01", "2020-01-02"], "M8[s]"),
     "text": np.array(["0.3", "0.2"]),

@@ -94,6 +94,7 @@ def _show(found: dict[str, Any]) -> None:
             ("most", "right"),
             ("time a call [us]", "right"),
             ("error", "right"),
+            ("its own bound", "right"),
             ("outcome", "left"),
         ],
     )
@@ -106,6 +107,7 @@ def _show(found: dict[str, Any]) -> None:
             _cell(row["max_iterations"], 6),
             _cell(row["seconds"], 3, 1e6),
             _cell(row["error"], 2),
+            _estimate(row),
             row["outcome"],
             style=style,
         )
@@ -116,6 +118,12 @@ def _show(found: dict[str, Any]) -> None:
     say_warnings(found["warnings"])
     if "plot" in found:
         screen.print(f"Chart: {found['plot']}", markup=False)
+
+
+def _estimate(row: dict[str, Any]) -> str:
+    """What a solver says of its error; in brackets where it does not bound it."""
+    shown = _cell(row["error_estimate"], 2)
+    return shown if row["error_is_bound"] or not shown else f"({shown})"
 
 
 def _cell(value: float | None, digits: int, scale: float = 1.0) -> str:

@@ -2,8 +2,10 @@
 
 Algebraic: the recorded accelerations a leave a residual r = tau - ID(q, v, a) in the equations of
 motion. One step of refinement, a' = a + H^-1 r with the factorisation of the recursion, gives the
-loads that a should have had; their distance from the recorded ones is the error of the solver, be
-it rounding or an iteration that stopped early.
+loads that a should have had; their distance from the recorded ones is the error of the solver at
+the recorded states, be it rounding or an iteration that stopped early. That the solver led there by
+right accelerations is what it proved at every step (solve/checked_solver.hpp); where it did not,
+the error is not known, however small it looks at the samples.
 
 Integration: the same run at a tighter tolerance. Its own error is smaller by about the ratio of the
 tolerances, so that the distance of the two runs is the error of the first.
@@ -187,8 +189,9 @@ def bounds(run: RunLike, tighter: RunLike | None = None, model: Model | None = N
 
     Returns:
         Dataset over (quantity, joint), in the quantities' units: `algebraic`, `integration` and
-        `plus_minus`, their sum; the last two are NaN without `tighter`. Errors of the model, of
-        its data and of peaks that were not found (`sampling` of `summary`) are not in it.
+        `plus_minus`, their sum; the last two are NaN without `tighter`, `algebraic` where the run
+        has an iterative solver whose errors are not bounded (`run.warnings` says so). Errors of the
+        model, of its data and of peaks that were not found (`sampling` of `summary`) are not in it.
     """
     import xarray as xr
 
@@ -198,7 +201,8 @@ def bounds(run: RunLike, tighter: RunLike | None = None, model: Model | None = N
     peaks = summary(run, machine)
     names = [str(name) for name in peaks["quantity"].values]
     absent = np.isnan(peaks["peak"].values)
-    algebraic = np.where(absent, np.nan, _algebraic(run, machine, names))
+    unknown = absent | (run.dataset.attrs.get("solver_error") == "not bounded")
+    algebraic = np.where(unknown, np.nan, _algebraic(run, machine, names))
     integration = np.full_like(algebraic, np.nan)
     if tighter is not None:
         _check_tighter(run, tighter)

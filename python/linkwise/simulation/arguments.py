@@ -13,6 +13,9 @@ from linkwise._core import InputError, as_floats
 
 _DEFAULT_SAMPLES = 1000
 _MAX_SAMPLES = 100_000_000
+#: Of steps whose length is given; a billion of them take minutes.
+_MOST_STEPS = 1e12
+_LONGEST = 1e12
 
 T = TypeVar("T")
 
@@ -82,6 +85,7 @@ def sample_times(
     if duration is None:
         raise InputError("duration: missing; give the seconds to simulate")
     end = number("duration", duration)
+    _check_end("duration", end)
     if end / _DEFAULT_SAMPLES < np.finfo(np.float64).tiny:
         raise InputError(f"duration: {end:g} s is too short for a double; give a longer one")
     spacing = end / _DEFAULT_SAMPLES if every is None else number("every", every)
@@ -96,6 +100,25 @@ def sample_times(
     return np.append(spacing * np.arange(int(count) + 1), end)
 
 
+def _check_end(name: str, end: float) -> None:
+    if end > _LONGEST:
+        raise InputError(
+            f"{name}: {end:g} s given; give at most {_LONGEST:g} s, after which a double has no "
+            "room for steps of a tenth of a millisecond"
+        )
+
+
+def check_steps(end: float, options: Mapping[str, Any]) -> None:
+    """InputError where steps of a given length would take for ever until `end` [s]."""
+    for name in ("step", "max_step"):
+        length = options.get(name)
+        if length is not None and length > 0 and end > _MOST_STEPS * length:
+            raise InputError(
+                f"{name}: {length:g} s makes more than {_MOST_STEPS:g} steps until {end:g} s; give "
+                "a longer one"
+            )
+
+
 def _given_times(
     times: npt.ArrayLike, duration: float | None, every: float | None
 ) -> npt.NDArray[np.float64]:
@@ -106,6 +129,7 @@ def _given_times(
         raise InputError(f"times: expected shape (n,) with n > 0, given shape {listed.shape}")
     if not np.all(np.isfinite(listed)) or listed[0] < 0 or np.any(np.diff(listed) <= 0):
         raise InputError("times: expected finite, increasing times from 0 on, in seconds")
+    _check_end("times", float(listed[-1]))
     if duration is not None and listed[-1] > number("duration", duration):
         raise InputError(f"times: the last, {listed[-1]:g} s, is after duration = {duration:g} s")
     return listed

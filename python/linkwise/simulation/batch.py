@@ -16,7 +16,7 @@ from linkwise.notes import tell, warning_attrs, warnings_of
 from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
-from linkwise.simulation.arguments import number, optional_count, sample_times
+from linkwise.simulation.arguments import check_steps, number, optional_count, sample_times
 from linkwise.simulation.simulate import SimulationInterrupted, check_driven, set_driven
 
 if TYPE_CHECKING:
@@ -178,6 +178,7 @@ def simulate_batch(
     if integrator not in fixed:
         raise InputError(f"integrator: a batch takes {' or '.join(fixed)}, not {integrator!r}")
     options: dict[str, Any] = {"integrator": integrator, "step": number("step", step)}
+    check_steps(float(sampled[-1]), options)
     simulations = []
     for one in models:
         by_joint, by_name = check_driven(one, drives, wrenches)

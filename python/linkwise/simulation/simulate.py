@@ -8,6 +8,7 @@ import os
 import time as clock
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -27,6 +28,7 @@ from linkwise.record.schema import Schema, build_schema
 from linkwise.record.store import RunWriter
 from linkwise.results import Run
 from linkwise.simulation.arguments import (
+    check_steps,
     optional_count,
     options_object,
     sample_times,
@@ -174,6 +176,7 @@ def _record(
     schema: Schema,
     times: npt.NDArray[np.float64],
     progress: Callable[[Progress], object] | None,
+    solver_doubt: Callable[[float], Ignored | None],
     ignored: Sequence[Ignored],
 ) -> tuple[Run, Ending]:
     """Simulate and record. Whatever goes wrong, the samples so far become a complete run.
@@ -192,8 +195,10 @@ def _record(
             record.finish(said, _extremes(simulation, schema))
         raise
     attrs = _attributes_at_end(simulation, clock.monotonic() - started)
-    attrs |= warning_attrs([*_stiffness(simulation), *ignored])
-    finished = record.finish(attrs, _extremes(simulation, schema))
+    doubt = solver_doubt(simulation.statistics.solver_error)
+    attrs["solver_error"] = "bounded" if doubt is None else "not bounded"
+    noticed = [*_stiffness(simulation), *ignored, *([] if doubt is None else [doubt])]
+    finished = record.finish(attrs | warning_attrs(noticed), _extremes(simulation, schema))
     return Run(finished, record.path, model), ending
 
 
@@ -214,6 +219,26 @@ def _attributes_at_end(simulation: Simulation, wall_time: float) -> dict[str, An
         "total_evaluations": done.evaluations,
         "total_iterations": done.iterations,
     }
+
+
+def _solver_doubt(options: Mapping[str, Any], allowed: float, error: float) -> Ignored | None:
+    """What a run says of an iterative solver whose errors are too large or not known.
+
+    `error`: the largest of them, relative; infinite where it is not known. `allowed`: what the
+    solver was asked for. By the rule energy_norm it is known, and small enough.
+    """
+    rule = options.get("stop", DEFAULTS["stop"])
+    if np.isfinite(error) and (rule == "energy_norm" or error <= 10 * allowed):
+        return None
+    solver = options.get("solver", DEFAULTS["solver"])
+    size = f"up to {error:.1g} of the forces" if np.isfinite(error) else "not bounded"
+    cure = "a direct solver" if rule == "energy_norm" else 'stop "energy_norm" or a direct solver'
+    return Ignored(
+        "",
+        f"solver {solver!r}",
+        f"its errors are {size}, where {allowed:.1g} was asked for, and no bound of the loads holds"
+        f"; use {cure}",
+    )
 
 
 def failure_message(model: Model, ending: Ending) -> str:
@@ -294,7 +319,8 @@ def simulate(
 
     What was ignored or assumed when the model was made is in `run.warnings`, and a ModelWarning
     each where `linkwise.load` did not say it. `run.warnings` also names tables that do not cover
-    the run, functions whose short changes may be missed, and since when the motion is stiff.
+    the run, functions whose short changes may be missed, since when the motion is stiff, and an
+    iterative solver whose errors are not bounded.
     """
     sampled = sample_times(duration, every, times)
     start = (
@@ -319,6 +345,7 @@ def simulate(
         check_target(output)
         output = os.path.abspath(output)  # a function of the caller's may change the folder
     options = chosen.options(tolerance)
+    check_steps(float(sampled[-1]), options)
     count = optional_count("threads", threads)
     simulation = _core.Simulation(model, **options, threads=count)
     notes = set_driven(simulation, model, by_joint, by_name, float(sampled[-1]), start)
@@ -347,7 +374,9 @@ def simulate(
     recorder = _recorder(
         model, schema, attrs, sampled.size, output, lambda: _extremes(simulation, schema)
     )
-    run, ending = _record(model, simulation, recorder, schema, sampled, progress, ignored)
+    allowed = options.get("solver_tolerance", simulation.step_tolerance / 10)
+    doubt = partial(_solver_doubt, options, allowed)
+    run, ending = _record(model, simulation, recorder, schema, sampled, progress, doubt, ignored)
     if on_failure == "raise":
         raise_failure(model, ending, run)
     return run

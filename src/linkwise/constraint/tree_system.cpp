@@ -17,7 +17,9 @@ TreeSystem::TreeSystem(const Model& model, const Executor& executor)
       known_(model.n_bodies()),
       g_(model.n_bodies()),
       w_(model.n_bodies()),
-      a_(model.n_bodies()) {
+      a_(model.n_bodies()),
+      off_(model.n_bodies()),
+      moved_(model.n_bodies()) {
   require_regular_inertias(model);
   std::vector<int> parent, dim;
   const auto& armature = model.dof_values(DofProperty::armature);
@@ -149,9 +151,37 @@ void TreeSystem::assemble_rows(const SweepInput<double>& in) {
   }
 }
 
+/// Adds body n to the squares. `relative`: the acceleration across its joint, of which `open` is
+/// what the joint forbids.
+void TreeSystem::add_distance(int n, const SweepInput<double>& in, const std::vector<double>& f,
+                              const double* du, const Motion<double>& relative,
+                              const Motion<double>& open, Distance& distance) {
+  const int parent = model_->topology[n].parent;
+  const auto& armature = model_->dof_values(DofProperty::armature);
+  const JointConstraint<double>& joint = joint_[n];
+  const RigidBody<double>& body = model_->constants[n].rigid;
+  for (int r = 0; r < joint.rows; ++r) {
+    const int i = joint.armature_of[r];
+    if (i < 0) continue;
+    const double off = du[i] - (in.tau[i] - f[A_.offset[n] + r]) / armature[i];
+    distance.gap += armature[i] * off * off;
+    distance.size += armature[i] * du[i] * du[i];
+  }
+  Motion<double> off = parent >= 0 ? state_[n].X * off_[parent] : Motion<double>{};
+  off = {off.lin - open.lin, off.ang - open.ang};
+  off_[n] = off;
+  distance.gap += dot(off, inertia_times(body, off));
+  if (!distance.with_size) return;
+  Motion<double> moved = parent >= 0 ? state_[n].X * moved_[parent] : Motion<double>{};
+  moved += Motion<double>{relative.lin - open.lin, relative.ang - open.ang};
+  moved_[n] = moved;
+  distance.size += dot(moved, inertia_times(body, moved));
+}
+
 void TreeSystem::recover(const SweepInput<double>& in, const std::vector<double>& f, double* du,
-                         double* loads) {
+                         double* loads, Distance* distance) {
   const Model& model = *model_;
+  if (distance) distance->gap = distance->size = 0;
   for (int n = 0; n < model.n_bodies(); ++n) {
     Vector6<double> w = to_array(known_[n]);
     for (int r = 0; r < joint_[n].rows; ++r)
@@ -176,14 +206,20 @@ void TreeSystem::recover(const SweepInput<double>& in, const std::vector<double>
       for (int r = 0; r < 6; ++r) sum += joint_[n].dual[i][r] * gap[r];
       du[joint_[n].dof[i]] = sum;
     }
+    Vector6<double> opened{};
     for (int r = 0; r < joint_[n].rows; ++r) {
       if (joint_[n].armature_of[r] >= 0) continue;
       double sum = 0;
       for (int i = 0; i < 6; ++i) sum += joint_[n].B[r][i] * gap[i];
       worst = std::max(worst, std::abs(sum));
+      if (distance)
+        for (int i = 0; i < 6; ++i) opened[i] += sum * joint_[n].B[r][i];
     }
     copy_prescribed(model, model.topology[n], in, du);
+    if (distance) add_distance(n, in, f, du, relative, to_motion(opened.data()), *distance);
   }
+  if (distance)
+    *distance = {std::sqrt(distance->gap), std::sqrt(distance->size), distance->with_size};
   violation_ = largest > 0 ? worst / largest : 0;
   if (loads)
     store_joint_loads(

@@ -35,9 +35,19 @@ class TreeSystem {
   void assemble_rows(const SweepInput<double>& in);
   /// Of the states at hand.
   const JointConstraint<double>& joint(int body) const { return joint_[body]; }
-  /// du [nv] from the solution f; loads [n_joints][6] or null.
+  /// How far an f that is not exact and the du that follow from it are from the truth. The bodies'
+  /// accelerations of f balance all forces but open the joints; those of du keep the joints
+  /// together. The truth does both, and as the two kinds of error are at right angles in the norm
+  /// of the kinetic energy, the distance of the two bounds either [prager1947]:
+  ///     gap^2 = ||f* - f||_A^2 + ||du* - du||^2.
+  struct Distance {
+    double gap = 0;
+    double size = 0;         ///< ||du||
+    bool with_size = false;  ///< is it wanted?
+  };
+  /// du [nv] from the solution f; loads [n_joints][6] or null; the distance or null.
   void recover(const SweepInput<double>& in, const std::vector<double>& f, double* du,
-               double* loads);
+               double* loads, Distance* distance = nullptr);
   /// Accelerations of the bodies that recover() found, the ground's being minus gravity.
   const std::vector<Motion<double>>& accelerations() const { return a_; }
   /// Largest violation of a constraint by the accelerations that recover() found, relative to the
@@ -48,6 +58,9 @@ class TreeSystem {
 
  private:
   void calc_constraints();
+  void add_distance(int n, const SweepInput<double>& in, const std::vector<double>& f,
+                    const double* du, const Motion<double>& relative, const Motion<double>& open,
+                    Distance& distance);
   void calc_free_accelerations(const SweepInput<double>& in);
   void assemble_node(int n, const SweepInput<double>& in);
 
@@ -60,7 +73,7 @@ class TreeSystem {
   std::vector<GeneralState<double>> general_;
   std::vector<JointConstraint<double>> joint_;
   std::vector<Force<double>> known_, g_, w_;
-  std::vector<Motion<double>> a_;
+  std::vector<Motion<double>> a_, off_, moved_;
   double violation_ = 0;
 };
 

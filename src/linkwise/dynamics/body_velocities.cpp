@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
 namespace {
@@ -23,7 +22,7 @@ std::string solver_name(const Model& model, const DynamicsOptions& options) {
 BodyVelocities::BodyVelocities(const Model& model, const DynamicsOptions& options)
     : model_(&model),
       system_(model),
-      solver_(make_solver(solver_name(model, options), options.solver_options)),
+      solver_(solver_name(model, options), options.solver_options, options.initial_guess != "zero"),
       guess_(make_initial_guess(options.initial_guess, options.solver_options.own)),
       f_(system_.A().size()),
       du_(model.nv()),
@@ -107,10 +106,13 @@ DynamicsReport BodyVelocities::evaluate(double t, const SweepInput<double>& in, 
   });
   system_.assemble_rows(in);
   guess_->predict(t, system_.A(), system_.b(), f_);
-  DynamicsReport report{solver_->solve(system_.A(), system_.b(), f_)};
+  DynamicsReport report{solver_.solve(system_.A(), system_.b(), f_, [&](bool with_size) {
+    TreeSystem::Distance found{.with_size = with_size};
+    system_.recover(in, f_, du_.data(), nullptr, solver_.is_direct() ? nullptr : &found);
+    return MotionError{found.gap, found.size};
+  })};
   if (report.node >= 0) report.body = system_.body_of_node(report.node);
   guess_->solved(t, f_);
-  system_.recover(in, f_, du_.data(), nullptr);
   // Accelerations are relative to a ground that falls upward, a_0 = -g; the velocities are not.
   const Motion<double> ground = ground_acceleration<double>(*model_, in.gravity_factor);
   for (int n = 0; n < model_->n_bodies(); ++n) {

@@ -10,6 +10,7 @@
 
 #include "linkwise/constraint/tree_system.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
+#include "linkwise/solve/checked_solver.hpp"
 
 namespace linkwise {
 
@@ -35,7 +36,7 @@ class BodyVelocities {
 
   const Model* model_;
   TreeSystem system_;
-  std::unique_ptr<LinearSolver> solver_;
+  CheckedSolver solver_;
   std::unique_ptr<InitialGuess> guess_;
   std::vector<double> f_, du_;
   std::vector<Motion<double>> v_, gravity_;

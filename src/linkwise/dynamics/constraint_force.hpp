@@ -4,6 +4,7 @@
 #include "linkwise/constraint/tree_system.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
 #include "linkwise/dynamics/refinement.hpp"
+#include "linkwise/solve/checked_solver.hpp"
 
 namespace linkwise {
 
@@ -18,10 +19,9 @@ class ConstraintForce : public DynamicsMethod {
 
  private:
   TreeSystem system_;
-  std::unique_ptr<LinearSolver> solver_;
+  CheckedSolver solver_;
   std::unique_ptr<InitialGuess> guess_;
   std::vector<double> f_, df_;
-  bool direct_;
   Refinement<double> refinement_;
 };
 

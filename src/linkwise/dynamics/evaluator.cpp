@@ -89,6 +89,7 @@ void one_by_one(const Model& m, DynamicsMethod& method, size_t count, const Batc
                         out.joint_load ? out.joint_load + i * 6 * m.n_joints() : nullptr);
     report.iterations = std::max(report.iterations, r.iterations);
     report.error_estimate = std::max(report.error_estimate, r.error_estimate);
+    report.error_is_bound = r.error_is_bound && (i == 0 || report.error_is_bound);
     if (!r.ok()) {
       report.outcome = r.outcome;
       if (r.body >= 0) report.body = r.body;

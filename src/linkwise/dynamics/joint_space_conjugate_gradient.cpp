@@ -1,5 +1,8 @@
 #include "linkwise/dynamics/joint_space_conjugate_gradient.hpp"
 
+#include <cmath>
+
+#include "linkwise/solve/checked_solver.hpp"
 #include "linkwise/spatial/composite.hpp"
 
 namespace linkwise {
@@ -9,6 +12,7 @@ JointSpaceConjugateGradient::JointSpaceConjugateGradient(const Model& model,
     : model_(&model),
       options_(options.solver_options),
       inverse_(model),
+      recursion_(model),
       columns_(model),
       composite_(model.n_bodies()),
       a_(model.n_bodies()),
@@ -16,7 +20,9 @@ JointSpaceConjugateGradient::JointSpaceConjugateGradient(const Model& model,
       inverse_diagonal_(columns_.count()),
       b_(columns_.count()),
       x_(columns_.count()),
-      tau_(model.nv()) {
+      tau_(model.nv()),
+      residual_(columns_.count()),
+      correction_(model.nv()) {
   validate(options_);
 }
 
@@ -66,6 +72,65 @@ void JointSpaceConjugateGradient::multiply(std::span<const double> x, std::span<
   }
 }
 
+/// The error of x_ in the norm of the kinetic energy: sqrt(r^T H^-1 r), and H^-1 r is what the
+/// recursion makes of torques r. NaN where it fails.
+double JointSpaceConjugateGradient::error(const SweepInput<double>& in) {
+  multiply(x_, residual_);
+  std::fill(tau_.begin(), tau_.end(), 0.0);
+  for (int k = 0; k < columns_.count(); ++k) {
+    residual_[k] = b_[k] - residual_[k];
+    tau_[columns_.dof(k)] = residual_[k];
+  }
+  SweepInput<double> rest;
+  rest.q = in.q;
+  rest.tau = tau_.data();
+  rest.gravity_factor = 0;
+  if (!recursion_.evaluate(rest, correction_.data(), nullptr))
+    return std::numeric_limits<double>::quiet_NaN();
+  double square = 0;
+  for (int k = 0; k < columns_.count(); ++k) square += residual_[k] * correction_[columns_.dof(k)];
+  return std::sqrt(std::max(0.0, square));
+}
+
+/// H x = b from x_, checked as in CheckedSolver.
+Report JointSpaceConjugateGradient::solve(const SweepInput<double>& in) {
+  SolverOptions options = options_;
+  const int limit =
+      options_.max_iterations > 0 ? options_.max_iterations : 10 * columns_.count() + 100;
+  Report report;
+  for (Strictness strictness(1.0);;) {
+    options.tolerance = strictness.value() * options_.tolerance;
+    options.absolute_tolerance = strictness.value() * options_.absolute_tolerance;
+    stop_.start(options, nullptr, limit - report.iterations);
+    stop_.set_right_hand_side(b_);
+    conjugate_gradients(
+        b_, x_, stop_, work_,
+        [this](std::span<const double> x, std::span<double> y) { multiply(x, y); },
+        [this](std::span<const double> r, std::span<double> z) -> std::span<const double> {
+          for (size_t k = 0; k < r.size(); ++k) z[k] = inverse_diagonal_[k] * r[k];
+          return z;
+        },
+        options_.executor);
+    report = {stop_.outcome(), report.iterations + stop_.iterations(), stop_.relative_error()};
+    const double off = error(in);
+    if (!std::isfinite(off)) return report;
+    const double energy = std::sqrt(std::max(0.0, dot(x_, b_)));
+    report.error_estimate = energy > 0.0 ? off / energy : off;
+    report.error_is_bound = true;
+    if (!report.ok() || options_.stop != StopRule::energy_norm) return report;
+    const double excess = off / (options_.tolerance * energy + options_.absolute_tolerance);
+    if (excess <= Strictness::slack) return report;
+    if (report.iterations >= limit) {
+      report.outcome = Outcome::reached_max_iterations;
+      return report;
+    }
+    if (!strictness.tighten(excess, false)) {
+      report.outcome = Outcome::stagnated;
+      return report;
+    }
+  }
+}
+
 DynamicsReport JointSpaceConjugateGradient::evaluate(double, const SweepInput<double>& in,
                                                      double* du, double* loads) {
   const Model& model = *model_;
@@ -83,22 +148,7 @@ DynamicsReport JointSpaceConjugateGradient::evaluate(double, const SweepInput<do
     b_[k] = in.tau[columns_.dof(k)] - tau_[columns_.dof(k)];
     x_[k] = 0;
   }
-  const int limit =
-      options_.max_iterations > 0 ? options_.max_iterations : 10 * columns_.count() + 100;
-  stop_.start(options_, nullptr, limit);
-  stop_.set_right_hand_side(b_);
-  if (sum_of_squares(b_) != 0.0) {
-    conjugate_gradients(
-        b_, x_, stop_, work_,
-        [this](std::span<const double> x, std::span<double> y) { multiply(x, y); },
-        [this](std::span<const double> r, std::span<double> z) -> std::span<const double> {
-          for (size_t k = 0; k < r.size(); ++k) z[k] = inverse_diagonal_[k] * r[k];
-          return z;
-        },
-        options_.executor);
-    static_cast<Report&>(report) = {stop_.outcome(), stop_.iterations(), stop_.relative_error(),
-                                    -1};
-  }
+  if (sum_of_squares(b_) != 0.0) static_cast<Report&>(report) = solve(in);
   for (int k = 0; k < columns_.count(); ++k) du[columns_.dof(k)] = x_[k];
   if (loads) inverse_.evaluate(in, du, nullptr, loads);
   return report;

@@ -5,6 +5,7 @@
 // preconditioner is the diagonal of H, from composite inertias.
 #include <vector>
 
+#include "linkwise/dynamics/articulated_body.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
 #include "linkwise/dynamics/inverse_dynamics.hpp"
 #include "linkwise/kinematics/body_columns.hpp"
@@ -22,16 +23,19 @@ class JointSpaceConjugateGradient : public DynamicsMethod {
 
  private:
   bool calc_diagonal();
+  Report solve(const SweepInput<double>& in);
+  double error(const SweepInput<double>& in);
   void multiply(std::span<const double> x, std::span<double> y);
 
   const Model* model_;
   SolverOptions options_;
   InverseDynamics<double> inverse_;
+  ArticulatedBody<double> recursion_;  ///< what the result is checked by
   BodyColumns columns_;
   std::vector<Inertia<double>> composite_;
   std::vector<Motion<double>> a_;
   std::vector<Force<double>> w_;
-  std::vector<double> inverse_diagonal_, b_, x_, tau_;
+  std::vector<double> inverse_diagonal_, b_, x_, tau_, residual_, correction_;
   StopTest stop_;
   KrylovVectors work_;
   int failed_body_ = -1;

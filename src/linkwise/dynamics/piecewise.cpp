@@ -4,7 +4,7 @@
 #include "linkwise/constraint/joint_constraint.hpp"
 #include "linkwise/exec/executor.hpp"
 #include "linkwise/recursion/piece_group.hpp"
-#include "linkwise/solve/registry.hpp"
+#include "linkwise/solve/checked_solver.hpp"
 
 namespace linkwise {
 namespace {
@@ -23,9 +23,8 @@ class PiecewiseChain {
         length_((n_ + n_pieces_ - 1) / n_pieces_),
         pose_(n_pieces_),
         bias_(n_pieces_),
-        solver_(make_solver(
-            options.solver.empty() || options.solver == "auto" ? "thomas" : options.solver,
-            options.solver_options)) {
+        solver_(options.solver.empty() || options.solver == "auto" ? "thomas" : options.solver,
+                options.solver_options, false) {
     std::vector<int> parent, dim(n_pieces_, cut_rows);
     for (int s = 0; s < n_pieces_; ++s) parent.push_back(s - 1);
     A_.set_structure(parent, dim);
@@ -55,7 +54,7 @@ class PiecewiseChain {
           groups_[g].eliminate_joints([&](int k) { return gather(in.tau, g, k); }, cuts_[g].ends);
     });
     assemble();
-    DynamicsReport report{solver_->solve(A_, b_, f_)};
+    DynamicsReport report{solver_.solve(A_, b_, f_)};
     for (const Cuts& cuts : cuts_)
       if (!cuts.answer.positive) report.outcome = Outcome::not_positive_definite;
     if (!report.ok()) {
@@ -222,7 +221,7 @@ class PiecewiseChain {
   std::vector<Motion<double>> bias_;     ///< c of the cut joints
   BlockTree A_;
   std::vector<double> b_, f_;
-  std::unique_ptr<LinearSolver> solver_;
+  CheckedSolver solver_;
   const SweepInput<double>* in_ = nullptr;
 };
 

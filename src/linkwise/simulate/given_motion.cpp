@@ -29,10 +29,13 @@ void normalise_quaternions(const Model& model, double* q) {
 }
 
 void check_quaternions(const Model& model, const double* q) {
+  if (model.nq() == model.nv()) return;  // there is none
   for_quaternions(model, q, [&](const Element& e, const double* p) {
-    if (!(length(p) > 1e-6))
-      throw InputError("joint '" + model.joints[e.joint].name + "'" + model.where() +
-                       ": its quaternion has zero length; give x, y, z, w of length 1");
+    if (length(p) > 1e-6) return;
+    const auto at = p - q;
+    throw InputError("q[" + std::to_string(at) + ":" + std::to_string(at + 4) +
+                     "]: the quaternion of joint '" + model.joints[e.joint].name + "'" +
+                     model.where() + " has no length; give x, y, z, w of length 1");
   });
 }
 

@@ -13,6 +13,9 @@ namespace linkwise {
 
 struct SimulationStatistics : IntegratorStatistics {
   long iterations = 0;
+  /// Largest error that a solution for the integrator can have had, as Report has it; infinity
+  /// where one was not bounded. 0 of direct solvers.
+  double solver_error = 0.0;
 };
 
 /// One member at one time, as the writers of the table see it.

@@ -51,6 +51,7 @@ void Simulation::start(double t0, const Start& start) {
   endings_.assign(members_, {Outcome::converged, t0, "", ""});
   failure_ = {};
   iterations_ = 0;
+  solver_error_ = 0.0;
   work_.reset();
   work_is_done_ = start.tau || setup_->does_work();
   sampled_ = false;
@@ -188,7 +189,13 @@ Outcome Simulation::judge(double t, const DynamicsReport& report, const double* 
   const bool good_enough =
       solver_tolerance_ && report.outcome == Outcome::stagnated &&
       report.error_estimate <= setup_->options.dynamics.solver_options.tolerance;
-  if ((report.ok() || good_enough) && std::isfinite(sum)) return Outcome::converged;
+  if ((report.ok() || good_enough) && std::isfinite(sum)) {
+    if (report.iterations > 0)
+      solver_error_ =
+          std::max(solver_error_, report.error_is_bound ? report.error_estimate
+                                                        : std::numeric_limits<double>::infinity());
+    return Outcome::converged;
+  }
   failure_ = failure(0, t, report.ok() ? Outcome::not_finite : report.outcome, report.body, du);
   return failure_.outcome;
 }
@@ -527,6 +534,7 @@ SimulationStatistics Simulation::statistics() const {
   SimulationStatistics out;
   if (integrator_) static_cast<IntegratorStatistics&>(out) = integrator_->statistics();
   out.iterations = iterations_;
+  out.solver_error = solver_error_;
   return out;
 }
 

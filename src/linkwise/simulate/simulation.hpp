@@ -164,6 +164,7 @@ class Simulation : private OdeSystem {
   std::vector<Ending> endings_;
   Ending failure_;  ///< of the last evaluation of one member that failed in the present step
   long iterations_ = 0;
+  double solver_error_ = 0.0;
   EvaluationObserver* observer_ = nullptr;
   std::function<bool()> interrupted_;
 };

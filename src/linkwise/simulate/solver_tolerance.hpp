@@ -1,13 +1,13 @@
 #pragma once
 // How accurately the constraint forces must be known for the integrator not to notice their error.
 //
-// An error e of the forces is an error a of the joints' accelerations with
-//     ||e||_A^2 = a^T H a    (theory of constraint forces),
-// hence |a_i| <= sqrt((H^-1)_ii) ||e||_A. Over a step of length h it moves the rates by h a. The
+// Let e bound the forces' error in the A-norm and that of the joints' accelerations,
+//     a^T H a <= e^2    (theory of constraint forces),
+// hence |a_i| <= sqrt((H^-1)_ii) e. Over a step of length h it moves the rates by h a. The
 // integrator accepts errors of 1 in the norm sqrt(mean_i (error_i / w_i)^2) over the n components
 // of its state, w_i = rtol |y_i| + atol. The forces may take a tenth of it, as in [sharf1993] and
 // in SUNDIALS' own iterations:
-//     ||e||_A <= 0.1 / (h sqrt(sum_i (H^-1)_ii / w_i^2 / n))
+//     e <= 0.1 / (h sqrt(sum_i (H^-1)_ii / w_i^2 / n))
 #include <memory>
 
 #include "linkwise/dynamics/mobility.hpp"

@@ -70,8 +70,10 @@ void validate(const SolverOptions& options);
 struct Report {
   Outcome outcome = Outcome::converged;
   int iterations = 0;
-  /// Estimate of ||x* - x||_A / ||x*||_A; NaN when a direct solver was not asked for it.
+  /// ||x* - x||_A / ||x*||_A, estimated or bounded; NaN when a direct solver was not asked for it.
   double error_estimate = 0.0;
+  /// Is error_estimate an upper bound that knows all modes, up to rounding? See CheckedSolver.
+  bool error_is_bound = false;
   /// The node at which a factorisation broke down, or of the largest residual where an iteration
   /// ended without meeting its tolerance, or -1.
   int node = -1;
@@ -96,6 +98,8 @@ class LinearSolver {
                             std::span<double> x);
 
   const SolverOptions& options() const { return options_; }
+  /// Of later solves, as max_iterations of the options.
+  void limit_iterations(int most) { options_.max_iterations = most; }
 
  protected:
   explicit LinearSolver(const SolverOptions& options) : options_(options) {}

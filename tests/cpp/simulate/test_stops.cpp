@@ -159,7 +159,8 @@ TEST(Refused, EachWithOneLine) {
   EXPECT_EQ(error_of([&] {
               simulation.start(0, {q.data(), v.data()});
             }),
-            "joint 'joint2' of arm.urdf: its quaternion has zero length; give x, y, z, w of length "
+            "q[2:6]: the quaternion of joint 'joint2' of arm.urdf has no length; give x, y, z, w "
+            "of length "
             "1");
   q.back() = 1;
   lock.kind = DriveKind::locked;

@@ -39,6 +39,8 @@ def test_every_method_solver_and_guess_is_compared(quick, arm):
             assert row["outcome"] == "converged"
             assert row["error"] < 1e-4
             assert (row["mean_iterations"] is None) == (solver["kind"] == "direct")
+            assert (row["error_estimate"] is None) == (solver["kind"] == "direct")
+            assert row["error_is_bound"] == (solver["kind"] == "iterative")
     assert {method["name"] for method in lw.methods()} == {method for method, _, _ in rows}
     times = [r["seconds"] for r in found["rows"] if r["outcome"] == "converged"]
     assert times == sorted(times)
@@ -50,6 +52,8 @@ def test_the_table_shows_all_rows_for_people(quick, arm):
     for solver in lw.solvers():
         assert solver["name"] in result.out
     assert "10 unknowns" in result.out
+    assert "own" in result.out
+    assert "bound" in result.out
     assert "converged" in result.out
 
 

@@ -77,6 +77,7 @@ Report DirectSolver::refine(const BlockTree& A, std::span<const double> b, std::
     if (step < refinement_steps_) add_scaled(1.0, correction_, x);
   }
   report.iterations = refinement_steps_;
+  report.error_is_bound = true;
   return report;
 }
 

@@ -105,7 +105,7 @@ Report IterativeSolver::run(const BlockTree& A, std::span<const double> b, std::
   else
     std::copy(x_.begin(), x_.end(), x.begin());
 
-  Report report{stop_.outcome(), stop_.iterations(), stop_.relative_error(), -1};
+  Report report{stop_.outcome(), stop_.iterations(), stop_.relative_error()};
   if (!std::isfinite(sum_of_squares(x, executor()))) report.outcome = Outcome::not_finite;
   const bool ended = report.ok() || report.outcome == Outcome::stagnated;
   // If the guess is almost exact, no decrease can be seen, and the residual decides.
