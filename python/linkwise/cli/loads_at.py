@@ -20,8 +20,8 @@ AtOption = Annotated[
     typer.Option(
         "--at",
         metavar="LINK|child|parent|world",
-        help="Loads at and in the frame of any link; with -j also of fixed joints whose links "
-        "are merged, such as force sensors.",
+        help="Loads at and in the frame of any link, at the samples; with -j also of fixed joints "
+        "whose links are merged, such as force sensors.",
     ),
 ]
 PointOption = Annotated[
