@@ -147,7 +147,11 @@ def test_messages_say_merged(tmp_path):
         read.simulate_arguments(read.load_model())
 
 
-def test_axes_that_line_up_are_named_with_the_cure():
+METHODS = ("auto", "constraint_force", "composite_rigid_body", "global_projection")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_axes_that_line_up_are_named_with_the_cure(method):
     builder = lw.ModelBuilder()
     for name in ("base", "f1", "f2"):
         builder.add_link(name)
@@ -157,11 +161,32 @@ def test_axes_that_line_up_are_named_with_the_cure():
     model = builder.build()
     locked = [0, np.pi / 2, 0]
     with pytest.raises(lw.NumericsError) as caught:
-        lw.forward_dynamics(model, locked, [0, 0, 0.3])
-    run = lw.simulate(model, duration=0.1, q0=locked, on_failure="return")
+        lw.forward_dynamics(model, locked, [0, 0, 0.3], method=method)
+    many = np.tile([0.1, 0.2, 0.3], (20, 1))
+    assert np.isfinite(lw.forward_dynamics(model, many, 0 * many, method=method)).all()
+    many[13] = locked
+    with pytest.raises(lw.NumericsError):
+        lw.forward_dynamics(model, many, 0 * many, method=method)
+    run = lw.simulate(
+        model, duration=0.1, q0=locked, on_failure="return", numerics={"method": method}
+    )
     for text in (str(caught.value), run.message):
         for part in ("'x', 'y', 'z' line up", "gimbal lock", "'f1', 'f2'", "spherical joint"):
             assert part in text
+
+
+@pytest.mark.parametrize("solver", [s["name"] for s in lw.solvers()])
+def test_no_solver_returns_an_answer_where_axes_line_up(solver):
+    builder = lw.ModelBuilder()
+    builder.add_link("base")
+    builder.add_link("head", mass=5, com=(0, 0, 0.2), inertia=np.diag((0.03, 0.025, 0.02)))
+    axes = [("revolute", axis) for axis in np.eye(3)]
+    builder.add_joint("neck", "composite", "base", "head", axes=axes)
+    options = {"method": "constraint_force", "solver": solver}
+    model = builder.build()
+    assert np.isfinite(lw.forward_dynamics(model, [0, 1.5, 0], [0, 0, 0.3], **options)).all()
+    with pytest.raises(lw.NumericsError):
+        lw.forward_dynamics(model, [0, np.pi / 2, 0], [0, 0, 0.3], **options)
 
 
 def row_of_hinges(count, armature=None):

@@ -7,6 +7,7 @@
 // constraints.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/kinematics/body_state.hpp"
@@ -172,7 +173,20 @@ inline bool screw_complement(const Motion<double>* P, int n, Vector6<double>* du
   return true;
 }
 
-/// P as columns: one for a one-axis joint.
+/// Whether a dual is so long that rounding alone has made it: the columns of P are dependent, as
+/// those of hinges that line up are, and nothing says how the motion is shared among them.
+inline bool are_dependent(const Motion<double>* P, int n, const Vector6<double>* dual) {
+  constexpr double longest = 1e14;
+  for (int i = 0; i < n; ++i) {
+    double square = 0;
+    for (double x : dual[i]) square += x * x;
+    const double length = square * (dot(P[i].lin, P[i].lin) + dot(P[i].ang, P[i].ang));
+    if (!(length < longest * longest)) return true;
+  }
+  return false;
+}
+
+/// P as columns: one for a one-axis joint. Where they are dependent, all is NaN: no factor exists.
 inline void calc_joint_constraint(const Motion<double>* P, const int* dof, int n,
                                   const std::vector<double>& armature,
                                   JointConstraint<double>& out) {
@@ -182,6 +196,11 @@ inline void calc_joint_constraint(const Motion<double>* P, const int* dof, int n
   if (!separate_complement(P, n, out.dual, complement) &&
       !screw_complement(P, n, out.dual, complement))
     householder_complement(P, n, out.dual, complement);
+  if (n > 1 && are_dependent(P, n, out.dual)) {
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    for (int i = 0; i < n; ++i) out.dual[i].fill(none);
+    for (int i = 0; i < 6 - n; ++i) complement[i].fill(none);
+  }
   for (int i = 0; i < n; ++i) {
     out.dof[i] = dof[i];
     if (!(armature[dof[i]] > 0)) continue;
