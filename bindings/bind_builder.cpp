@@ -5,6 +5,7 @@
 
 #include "bind.hpp"
 #include "linkwise/model/builder.hpp"
+#include "numbers.hpp"
 #include "printable.hpp"
 #include "py_model.hpp"
 #include "vectors.hpp"
@@ -14,8 +15,8 @@ namespace {
 
 AxisSpec axis_spec(nb::handle item) {
   const bool is_sequence = nb::isinstance<nb::tuple>(item) || nb::isinstance<nb::list>(item);
-  if (is_sequence && nb::len(item) > 0 && nb::isinstance<nb::str>(item[0]))
-    return make_axis(nb::cast<std::string>(nb::object(item[0])), vec3(item[1], "axis"),
+  if (is_sequence && nb::len(item) > 1 && nb::isinstance<nb::str>(item[0]))
+    return make_axis(name_in(nb::object(item[0]), "kind of an axis"), vec3(item[1], "axis"),
                      nb::len(item) > 2 ? real_number(item[2], "pitch") : 0);
   return {AxisKind::revolute, vec3(item, "axis"), 0};
 }

@@ -6,6 +6,7 @@
 #include "bind.hpp"
 #include "linkwise/integrate/integrator.hpp"
 #include "linkwise/solve/registry.hpp"
+#include "numbers.hpp"
 #include "printable.hpp"
 #include "report.hpp"
 #include "solver_options.hpp"
@@ -32,7 +33,7 @@ DynamicsOptions options_of(const std::string& method, const std::string& solver,
   options.solver = solver;
   SolverOptions& o = options.solver_options;
   if (!tolerance.is_none()) o.tolerance = real_number(tolerance, "tolerance");
-  if (!stop.is_none()) o.stop = stop_rule_from_name(nb::cast<std::string>(stop));
+  if (!stop.is_none()) o.stop = stop_rule_from_name(name_in(stop, "stop"));
   if (const auto most = whole_number(max_iterations, "max_iterations")) o.max_iterations = *most;
   set_options(o, solver_option_values(solver_options));
   return options;

@@ -9,6 +9,7 @@
 #include "bind.hpp"
 #include "frame.hpp"
 #include "linkwise/model/validate.hpp"
+#include "numbers.hpp"
 #include "printable.hpp"
 #include "vectors.hpp"
 
@@ -100,7 +101,7 @@ nb::tuple placement_of(const PyModel& self, nb::handle value) {
 }  // namespace
 
 Frame as_frame(nb::handle value) {
-  if (nb::isinstance<nb::str>(value)) return {nb::cast<std::string>(value)};
+  if (nb::isinstance<nb::str>(value)) return {name_in(value, "frame")};
   if (nb::isinstance<Frame>(value)) return nb::cast<Frame>(value);
   throw InputError("frame is " + nb::cast<std::string>(nb::str(nb::repr(value))) +
                    "; give the name of a link, or a linkwise.Frame");
@@ -162,7 +163,7 @@ Raises:
              return nb::make_tuple(f.link, origin_of(f), matrix(transpose(f.placement.R)));
            })
       .def("__setstate__", [](Frame& f, const nb::tuple& state) {
-        new (&f) Frame(make_frame(nb::cast<std::string>(state[0]), state[1], state[2]));
+        new (&f) Frame(make_frame(name_in(state[0], "frame"), state[1], state[2]));
       });
 }
 

@@ -169,7 +169,7 @@ Raises:
 int joint_of(const PyModel& self, nb::handle body) {
   int joint = -1;
   if (nb::isinstance<nb::str>(body)) {
-    const LinkInfo& link = self.model->links[self.model->link_index(nb::cast<std::string>(body))];
+    const LinkInfo& link = self.model->links[self.model->link_index(name_in(body, "body"))];
     joint = link.joint;
     if (joint < 0 || self.model->links[self.model->joints[joint].link].name != link.name)
       throw InputError("link '" + link.name +

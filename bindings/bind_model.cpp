@@ -6,6 +6,7 @@
 #include "bind.hpp"
 #include "frame.hpp"
 #include "linkwise/model/builder.hpp"
+#include "numbers.hpp"
 #include "printable.hpp"
 #include "py_model.hpp"
 #include "vectors.hpp"
@@ -43,6 +44,9 @@ ModelSpec from_bytes(const nb::bytes& description) {
   ModelSpec spec = deserialize(std::string(description.c_str(), description.size()));
   for (const std::string* text : {&spec.name, &spec.source, &spec.floating_joint})
     check_text(*text);
+  for (const std::string& joint : spec.prescribed) check_text(joint);
+  for (const Note& note : spec.notes)
+    for (const std::string* text : {&note.element, &note.text}) check_text(*text);
   for (const LinkSpec& link : spec.links) check_text(link.name);
   for (const JointSpec& joint : spec.joints)
     for (const std::string* text : {&joint.name, &joint.parent, &joint.child}) check_text(*text);
@@ -241,6 +245,10 @@ void bind_joints(ModelClass& c) {
       .def(
           "joint_labels",
           [](const PyModel& s, int joint) {
+            if (joint < 0 || joint >= s.model->n_joints())
+              throw InputError("joint " + std::to_string(joint) +
+                               " is out of range; the model has " +
+                               std::to_string(s.model->n_joints()) + " joints");
             const JointSpec& spec = s.model->joint_spec(joint);
             return nb::make_tuple(to_tuple(coordinate_labels(spec)), to_tuple(rate_labels(spec)));
           },
@@ -425,7 +433,7 @@ void bind_storage(ModelClass& c) {
        "to_bytes",
        [](const PyModel& s, const nb::object& source) {
          ModelSpec spec = s.model->spec();
-         if (!source.is_none()) spec.source = nb::cast<std::string>(source);
+         if (!source.is_none()) spec.source = name_in(source, "source");
          return to_bytes(spec);
        },
        nb::kw_only(), "source"_a = nb::none(),

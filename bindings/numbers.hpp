@@ -19,6 +19,17 @@ inline std::optional<int> whole_number(nb::handle value, const char* name) {
                    "; give a whole number below 2^31");
 }
 
+/// A name from a table of the core.
+inline std::string name_in(nb::handle value, const char* name) {
+  if (nb::isinstance<nb::str>(value)) {
+    const char* text = PyUnicode_AsUTF8(value.ptr());
+    if (text) return text;
+    PyErr_Clear();  // half of a character
+  }
+  throw InputError(std::string(name) + " is " + nb::cast<std::string>(nb::str(nb::repr(value))) +
+                   "; give a name in quotes");
+}
+
 /// A real number of Python or NumPy.
 inline double real_number(nb::handle value, const char* name) {
   if (PyFloat_Check(value.ptr())) return PyFloat_AS_DOUBLE(value.ptr());

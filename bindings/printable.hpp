@@ -25,10 +25,22 @@ inline std::string printable(std::string_view text) {
   return shown;
 }
 
+/// The two ends of a message that a name of many characters has made too long to read.
+inline std::string shortened(std::string text) {
+  constexpr size_t longest = 4000, head = 3000, tail = 500;
+  const auto at_character = [&](size_t i) {
+    while (i < text.size() && (static_cast<unsigned char>(text[i]) & 0xc0) == 0x80) ++i;
+    return i;
+  };
+  if (text.size() <= longest) return text;
+  return text.substr(0, at_character(head)) + " ... " +
+         text.substr(at_character(text.size() - tail));
+}
+
 /// Raises a Python exception of this type with a message of the core. Bytes that are no text, which
 /// a damaged file may bring, do not hide it.
 inline void raise_printable(PyObject* type, const char* message) {
-  const std::string shown = printable(message);
+  const std::string shown = shortened(printable(message));
   PyObject* text =
       PyUnicode_DecodeUTF8(shown.data(), static_cast<Py_ssize_t>(shown.size()), "backslashreplace");
   if (!text) return;

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from linkwise._core import InputError
+from linkwise._core import InputError, as_floats
 from linkwise.base import Array
 
 SAMPLES = 2048
@@ -35,8 +35,8 @@ def as_breakpoints(times: npt.ArrayLike | None, what: str) -> Array | None:
     if times is None:
         return None
     try:
-        array = np.asarray(times, dtype=np.float64)
-    except (TypeError, ValueError):
+        array = as_floats(times, "breakpoints")
+    except InputError:
         array = np.full((1, 1), np.nan)
     if array.ndim != 1 or not np.isfinite(array).all():
         raise InputError(f"{what} breakpoints: give a sequence of finite times in seconds")

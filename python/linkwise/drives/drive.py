@@ -24,12 +24,17 @@ from linkwise.drives.course import (
     wrapped_at,
 )
 from linkwise.drives.jumps import LEAST_ROWS, NAMES, find_jump
+from linkwise.io.complaint import check_one_of, shown
 from linkwise.io.table import read_table
 
 if TYPE_CHECKING:
     from linkwise._core import Model
 Interpolation = Literal["linear", "cubic"]
 WrenchAxes = Literal["world", "body"]
+
+
+#: Beyond it, squares of times may overflow [s].
+_LONGEST = 1e100
 
 
 def _finite(value: npt.ArrayLike, what: str) -> Array:
@@ -79,10 +84,9 @@ class Table:
             raise InputError(
                 f"table times: {times[k + 1]:g} s after {times[k]:g} s; give increasing times"
             )
-        if self.interpolation not in ("linear", "cubic"):
-            raise InputError(
-                f"table interpolation: '{self.interpolation}' is unknown; use linear or cubic"
-            )
+        if np.abs(times).max() > _LONGEST:
+            raise InputError(f"table times: reach {np.abs(times).max():g} s; give shorter times")
+        check_one_of("table interpolation", self.interpolation, ("linear", "cubic"))
         spans = np.diff(times)
         with np.errstate(over="ignore"):
             slopes = np.diff(values, axis=0).T / spans
@@ -402,11 +406,11 @@ class Wrench:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "breakpoints", as_breakpoints(self.breakpoints, "wrench"))
-        if self.frame not in ("world", "body"):
-            raise InputError(f"wrench frame: '{self.frame}' is unknown; use world or body")
+        check_one_of("wrench frame", self.frame, ("world", "body"))
         if self.at is not None and not isinstance(self.at, str | Frame):
             raise InputError(
-                f"wrench at: {self.at!r} is no frame; give the name of a link, or a linkwise.Frame"
+                f"wrench at: {shown(self.at)} is no frame; give the name of a link, or a "
+                "linkwise.Frame"
             )
         if isinstance(self.value, Table):
             shape: tuple[int, ...] = self.value.values.shape[1:]

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from linkwise._core import InputError, as_floats, joint_poses
 from linkwise.base import Array
 from linkwise.drives.drive import Wrench
+from linkwise.io.complaint import shown
 
 if TYPE_CHECKING:
     from linkwise._core import Frame, Model
@@ -33,6 +34,8 @@ def external_wrenches(
     Raises:
         InputError: a link is unknown or on the ground, shapes are wrong, or a number is not finite.
     """
+    if not isinstance(wrenches, Mapping):
+        raise InputError(f"wrenches: {shown(wrenches)} given; give a dictionary by frame")
     state = as_floats(q, "q")
     poses = joint_poses(model, state)
     bodies = {name: k for k, name in enumerate(model.child_link_names)}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import NoReturn
 
 from linkwise._core import InputError
@@ -29,12 +29,24 @@ def file_name(path: str | os.PathLike[str]) -> str:
     return os.fspath(path).encode("utf-8", "replace").decode("utf-8")
 
 
-def near(name: str, known: Iterable[str], kind: str = "known") -> str:
+def shown(value: object) -> str:
+    """What was given where something else belongs, as a person would type it, not too long."""
+    return shorten(repr(value))
+
+
+def check_one_of(what: str, value: object, known: Collection[str]) -> None:
+    """InputError where `value` is none of the known names."""
+    if not (isinstance(value, str) and value in known):
+        names = (" or " if len(known) == 2 else ", ").join(known)
+        raise InputError(f"{what}: {shown(value)} is unknown; use {names}")
+
+
+def near(name: object, known: Iterable[str], kind: str = "known") -> str:
     """``did you mean 'elbow'?`` for the nearest known name, otherwise a list of some of them."""
     names = list(known)
     if not names:
         return "there are none"
-    if len(name) <= 200:
+    if isinstance(name, str) and len(name) <= 200:
         matches = difflib.get_close_matches(name, names[:5000], n=1, cutoff=0.6)
         if matches:
             return f"did you mean '{shorten(matches[0])}'?"

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 def xyzw_from_wxyz(quaternion: npt.ArrayLike) -> Array:
     """Quaternions (..., 4) from MuJoCo's order to linkwise's."""
-    return np.roll(np.asarray(quaternion, dtype=float), -1, axis=-1)
+    return np.roll(as_floats(quaternion, "quaternion"), -1, axis=-1)
 
 
 def wxyz_from_xyzw(quaternion: npt.ArrayLike) -> Array:
     """Quaternions (..., 4) from linkwise's order to MuJoCo's."""
-    return np.roll(np.asarray(quaternion, dtype=float), 1, axis=-1)
+    return np.roll(as_floats(quaternion, "quaternion"), 1, axis=-1)
 
 
 def position_from_mujoco(model: Model, mj_model: Any, qpos: npt.ArrayLike) -> Array:

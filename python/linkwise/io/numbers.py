@@ -9,6 +9,12 @@ from linkwise.io.complaint import shorten
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\Z")
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)\Z", re.IGNORECASE)
+#: What people write instead, and what belongs there.
+_HINTS = {
+    ",": ", which has a comma: points mark decimals, blanks separate numbers",
+    "\u2212": ", its minus is typographic: write -",
+    "pi": ", expressions are not computed: write 3.14159265358979 for pi",
+}
 #: Characters of no width that editors and web pages leave in copied text.
 _INVISIBLE = dict.fromkeys((0x200B, 0x200C, 0x200D, 0x2060, 0xFEFF, 0xAD, 0x200E, 0x200F))
 
@@ -25,8 +31,8 @@ def parse_number(text: str) -> float:
     if not _NUMBER.match(stripped):
         if _NOT_FINITE.match(stripped):
             raise ValueError(f"'{shorten(stripped)}' is not a finite number")
-        comma = ", which has a comma: points mark decimals, blanks separate numbers"
-        raise ValueError(f"'{shorten(stripped)}' is not a number{comma if ',' in stripped else ''}")
+        hint = next((text for mark, text in _HINTS.items() if mark in stripped), "")
+        raise ValueError(f"'{shorten(stripped)}' is not a number{hint}")
     value = float(stripped)
     if math.isinf(value):
         raise ValueError(f"'{shorten(stripped)}' is too large for a double")

@@ -168,7 +168,7 @@ class _Reader:
         xx, xy, xz, yy, yz, zz = (moments.number(a, f"inertia {a}") for a in _INERTIA)
         rotation = pose[:3, :3]
         inertia = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
-        inertia = 0.5 * (inertia + inertia.T)
+        inertia = 0.5 * inertia + 0.5 * inertia.T
         builder.add_link(name, mass=mass, com=pose[:3, 3], inertia=inertia)
         self._inertials[name] = (mass, pose[:3, 3], inertia)
 
@@ -284,12 +284,12 @@ class _Reader:
         """Warn of inertias that no body of the link's size can have: units, or a default of 1."""
         reach: dict[str, float] = {}
         for joint in joints:
-            length = float(np.linalg.norm(joint.properties.get("translation", np.zeros(3))))
+            length = math.hypot(*joint.properties.get("translation", np.zeros(3)))
             for link in (joint.parent, joint.child):
                 reach[link] = max(reach.get(link, 0.0), length)
         largest = max(reach.values(), default=0.0)
         for name, (mass, com, inertia) in self._inertials.items():
-            size = max(reach.get(name, 0.0), largest, float(np.linalg.norm(com)))
+            size = max(reach.get(name, 0.0), largest, math.hypot(*com))
             if mass <= 0 or size == 0:
                 continue
             radius = math.sqrt(max(0.0, float(np.trace(inertia)) / 2 / mass))

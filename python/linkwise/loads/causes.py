@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from linkwise import _core
-from linkwise._core import InputError
 from linkwise.base import Array, lengths
+from linkwise.io.complaint import check_one_of
 from linkwise.loads.samples import (
     drive_kinds,
     external,
@@ -58,8 +58,7 @@ class Split:
     """
 
     def __init__(self, run: RunLike, by: By, model: Model | None) -> None:
-        if by not in CAUSES:
-            raise InputError(f'by: {by!r} is unknown; use "force" or "motion"')
+        check_one_of("by", by, CAUSES)
         self.run, self.by = run, by
         machine = model_of(run, model)
         wanted = ["joint_load", "position", "velocity"]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from linkwise._core import InputError
+from linkwise._core import InputError, as_floats
 from linkwise.base import COMPONENTS, Array
+from linkwise.io.complaint import check_one_of, shown
 from linkwise.loads.engineering import QUANTITIES, derive, drive_power, has_power, joint_directions
 from linkwise.loads.samples import (
     joint_names,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 # Slopes of Woehler lines: welded steel, steel, cast iron and composites.
 EXPONENTS = (3.0, 5.0, 10.0)
+_MOST_BINS = 1_000_000
 
 
 def signal(
@@ -37,12 +39,10 @@ def signal(
     need(run, "joint_load")
     k = joint_position(run, joint)
     load = rows(run, "joint_load", slice(None))
+    check_one_of("quantity", quantity, (*COMPONENTS, *QUANTITIES))
     if quantity in COMPONENTS:
         c = COMPONENTS.index(quantity)
         return load[:, k, c], "N" if c < 3 else "N m"
-    if quantity not in QUANTITIES:
-        known = ", ".join((*COMPONENTS, *QUANTITIES))
-        raise InputError(f"quantity: {quantity!r} is unknown; use {known}")
     machine = model_of(run, model)
     found = select(run, machine)
     if quantity == "drive_power":
@@ -127,30 +127,34 @@ def damage_equivalent(
     import xarray as xr
 
     need(run, "joint_load")
-    if not len(exponents) or not all(np.isfinite(m) and m > 0 for m in exponents):
+    slopes = as_floats(exponents, "exponents")
+    if slopes.ndim != 1 or not slopes.size or not (np.isfinite(slopes) & (slopes > 0)).all():
         raise InputError("exponents: give positive numbers, such as 3, 5 and 10")
     times = run.dataset["time"].values
     if times.size < 2:
         raise InputError("run holds one sample, and cycles need two; record more, with every=")
     span = float(times[-1] - times[0])
-    count = span if repetitions is None else float(repetitions)
-    if not count > 0:
+    given_count = as_floats(span if repetitions is None else repetitions, "repetitions")
+    if given_count.ndim or not (np.isfinite(given_count) and given_count > 0):
         raise InputError("repetitions: give a positive number")
+    count = float(given_count)
+    if joints is not None and (isinstance(joints, str) or not isinstance(joints, Iterable)):
+        raise InputError(f"joints: {shown(joints)} given; give a list of names")
     names = joint_names(run) if joints is None else list(joints)
     where = [joint_position(run, name) for name in names]
     load = rows(run, "joint_load", slice(None))[:, where]
-    found = np.zeros((len(exponents), len(names), len(COMPONENTS)))
+    found = np.zeros((slopes.size, len(names), len(COMPONENTS)))
     for j in range(len(names)):
         for c in range(len(COMPONENTS)):
             counted = _count(load[:, j, c])
-            for k, m in enumerate(exponents):
+            for k, m in enumerate(slopes):
                 found[k, j, c] = equivalent(counted[:, 0], counted[:, 2], float(m), count)
     given = run.dataset["joint_load"]
     return xr.DataArray(
         found,
         dims=("exponent", "joint", "component"),
         coords={
-            "exponent": [float(m) for m in exponents],
+            "exponent": slopes.tolist(),
             "joint": names,
             "component": given["component"],
         },
@@ -170,8 +174,9 @@ def load_duration(
     import xarray as xr
 
     values, units = signal(run, joint, quantity, model)
-    if bins < 1:
-        raise InputError(f"bins: is {bins}; give a positive number of classes")
+    whole = isinstance(bins, int | np.integer) and not isinstance(bins, bool)
+    if not whole or not 1 <= bins <= _MOST_BINS:
+        raise InputError(f"bins: is {shown(bins)}; give a number of classes from 1 to {_MOST_BINS}")
     weights = trapezoid_weights(run.dataset["time"].values.astype(np.float64))
     low, high = float(values.min()), float(values.max())
     if high - low <= 1e-9 * max(abs(low), abs(high)):  # a constant: classes about it

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from linkwise import _core
 from linkwise._core import Frame, InputError, as_floats
 from linkwise.base import Array
-from linkwise.io.complaint import near
+from linkwise.io.complaint import check_one_of, near, shown
 from linkwise.loads.samples import model_of, need_whole, rows
 from linkwise.loads.welds import Weld
 
@@ -141,12 +141,13 @@ def _in_frame(
 
 
 def _checked(model: Model, frame: str | Frame, fixed_in: str) -> None:
-    if fixed_in not in _AXES:
-        raise InputError(f"fixed_in: {fixed_in!r} is unknown; use {', '.join(_AXES)}")
+    check_one_of("fixed_in", fixed_in, _AXES)
+    if not isinstance(frame, str | Frame):
+        raise InputError(f"frame: {shown(frame)} given; give the name of a link, or a Frame")
     if isinstance(frame, str) and frame not in _AXES and frame not in model.link_names:
         known = near(frame, model.link_names, "the links are")
         raise InputError(
-            f"frame: {frame!r} is unknown; use {', '.join(_AXES)}, a Frame or a link ({known})"
+            f"frame: {shown(frame)} is unknown; use {', '.join(_AXES)}, a Frame or a link ({known})"
         )
 
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from linkwise import base
 from linkwise._core import InputError, inverse_dynamics_loads, passive_torque
 from linkwise.base import Array
-from linkwise.io.complaint import near
+from linkwise.io.complaint import near, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +61,9 @@ def joint_position(run: RunLike, joint: str) -> int:
     """Which of the recorded joints this is."""
     names = joint_names(run)
     if joint not in names:
-        raise InputError(f"run holds no joint {joint!r}; {near(joint, names, 'the joints are')}")
+        raise InputError(
+            f"run holds no joint {shown(joint)}; {near(joint, names, 'the joints are')}"
+        )
     return names.index(joint)
 
 

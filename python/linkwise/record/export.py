@@ -13,6 +13,7 @@ import numpy as np
 
 from linkwise._core import InputError
 from linkwise.base import blocks
+from linkwise.io.complaint import shown
 from linkwise.io.writing import csv_cell, written_whole
 from linkwise.record.schema import TABLE
 
@@ -122,7 +123,7 @@ def write_csv(
         wanted = {quantity: [quantity]}
     elif quantity is not None:
         if quantity not in tables:
-            raise InputError(f"run holds no {quantity!r}; it holds {', '.join(tables)}")
+            raise InputError(f"run holds no {shown(quantity)}; it holds {', '.join(tables)}")
         wanted = {quantity: tables[quantity]}
     else:
         wanted = tables

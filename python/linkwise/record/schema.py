@@ -14,6 +14,7 @@ import numpy as np
 from linkwise._core import InputError
 from linkwise._core import quantities as recorded_quantities
 from linkwise.base import COMPONENTS, AnyArray
+from linkwise.io.complaint import shown
 from linkwise.record.extremes import ExtremesLayout, extremes_layout, labels
 from linkwise.record.labels import Scalars, joint_scalars, text_array
 from linkwise.record.variable import Variable
@@ -67,9 +68,12 @@ def resolve_quantities(quantities: Collection[str] | None) -> tuple[str, ...]:
         return QUANTITIES
     if isinstance(quantities, str):
         quantities = [quantities]
+    if not isinstance(quantities, Collection):
+        raise InputError(f"record: {shown(quantities)} given; give a list of quantities")
     for name in quantities:
-        if name not in QUANTITIES:
-            raise InputError(f"record: unknown quantity {name!r}; use {', '.join(QUANTITIES)}")
+        if not isinstance(name, str) or name not in QUANTITIES:
+            known = ", ".join(QUANTITIES)
+            raise InputError(f"record: unknown quantity {shown(name)}; use {known}")
     return tuple(name for name in QUANTITIES if name in quantities)
 
 
@@ -79,6 +83,8 @@ def resolve_joints(model: Model, joints: Sequence[str] | None) -> list[int]:
         return list(range(model.n_joints))
     if isinstance(joints, str):
         joints = [joints]
+    if not isinstance(joints, Collection) or not all(isinstance(name, str) for name in joints):
+        raise InputError(f"joints: {shown(joints)} given; give a list of names of joints")
     return sorted({model.joint_index(name) for name in joints})
 
 

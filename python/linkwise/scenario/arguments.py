@@ -85,7 +85,7 @@ class ScenarioSource:
 
 def key_path(keys: Sequence[str]) -> str:
     """Keys as TOML writes them: drive."left.elbow".kp."""
-    return ".".join(k if _BARE_KEY.match(k) else f'"{shorten(k)}"' for k in keys)
+    return ".".join(shorten(k) if _BARE_KEY.match(k) else f'"{shorten(k)}"' for k in keys)
 
 
 class ArgumentBuilder:

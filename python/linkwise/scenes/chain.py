@@ -17,6 +17,10 @@ EARTH = (0.0, 0.0, -9.81)
 _PATTERNS = ("alternating", "parallel", "random")
 
 
+#: Products of larger sizes may overflow, SI.
+_LARGEST = 1e100
+
+
 def rod_inertia(mass: float, length: float, radius: float) -> np.ndarray:
     """Central inertia (3, 3) [kg m2] of a solid cylinder along z."""
     across = mass * (3 * radius**2 + length**2) / 12
@@ -39,7 +43,8 @@ def joint_axes(axes: str | ArrayLike, n: int, seed: int) -> np.ndarray:
         return np.array([[0.0, 1.0, 0.0]])
     if axes == "random":
         return np.random.default_rng(seed).normal(size=(n, 3))
-    raise InputError(f"axes {axes!r} is unknown; known: {', '.join(_PATTERNS)}, or an array (k, 3)")
+    known = ", ".join(_PATTERNS)
+    raise InputError(f"axes {axes!r:.60} is unknown; known: {known}, or an array (k, 3)")
 
 
 #: Of a model and one evaluation of it; `python -m benchmarks peers --cases memory` measures it.
@@ -62,10 +67,13 @@ def check_count(name: str, n: int) -> None:
 
 def check_size(name: str, value: float, *, least: float | None = None) -> None:
     """InputError unless ``value`` is one finite number above 0, or of at least ``least``."""
-    real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not real or not np.isfinite(value) or (value <= 0 if least is None else value < least):
+    real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(
+        value, bool | np.timedelta64
+    )
+    size = value.item() if real and hasattr(value, "item") else value
+    if not (real and abs(size) < _LARGEST and (size > 0 if least is None else size >= least)):
         wanted = "above 0" if least is None else f"of at least {least:g}"
-        raise InputError(f"{name} is {value!r}; give a finite number {wanted}")
+        raise InputError(f"{name} is {value!r:.60}; give a number {wanted} and below {_LARGEST:g}")
 
 
 def chain(

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError, as_floats
+from linkwise.io.complaint import shown
 
 _DEFAULT_SAMPLES = 1000
 _MAX_SAMPLES = 100_000_000
@@ -30,11 +31,13 @@ def options_object(
     unknown. Of keywords those that are fields of it are taken out and go before."""
     known = [field.name for field in fields(kind)]  # type: ignore[arg-type]
     if given is not None and not isinstance(given, kind | Mapping):
-        raise InputError(f"{argument}: {given!r} given; give a linkwise.{kind.__name__}")
+        raise InputError(f"{argument}: {shown(given)} given; give a linkwise.{kind.__name__}")
     if isinstance(given, Mapping):
         for name in given:
             if name not in known:
-                raise InputError(f"{argument}: unknown option {name!r}; known: {', '.join(known)}")
+                raise InputError(
+                    f"{argument}: unknown option {shown(name)}; known: {', '.join(known)}"
+                )
         given = kind(**given)
     taken = {name: keywords.pop(name) for name in known if keywords and name in keywords}
     return replace(given or kind(), **taken)  # type: ignore[type-var]
@@ -55,9 +58,9 @@ def optional_count(name: str, value: Any) -> int | None:
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise InputError(f"{name}: {value!r} given; give a whole number of at least 1")
+        raise InputError(f"{name}: {shown(value)} given; give a whole number of at least 1")
     if value >= 2**31:
-        raise InputError(f"{name}: {value!r} given; give a whole number below 2^31")
+        raise InputError(f"{name}: {shown(value)} given; give a whole number below 2^31")
     return int(value)
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from linkwise import _core
 from linkwise._core import Frame, InputError, Model, as_floats
 from linkwise.base import Array
+from linkwise.io.complaint import shown
 from linkwise.loads.engineering import joint_directions
 from linkwise.notes import tell, warning_attrs, warnings_of
 from linkwise.record.provenance import plain, provenance
@@ -167,7 +168,7 @@ def simulate_batch(
     schema = build_schema(first, QUANTITIES if record is None else record, extremes=extremes)
     unknown = [name for name in schema.quantities if name not in QUANTITIES]
     if unknown:
-        raise InputError(f"record: a batch has no {unknown[0]!r}; use {', '.join(QUANTITIES)}")
+        raise InputError(f"record: a batch has no {shown(unknown[0])}; use {', '.join(QUANTITIES)}")
     given = {
         "q0": _rows("q0", first.initial_configuration() if q0 is None else q0, first.nq),
         "v0": _rows("v0", np.zeros(first.nv) if v0 is None else v0, first.nv),

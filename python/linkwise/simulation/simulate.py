@@ -19,6 +19,7 @@ from linkwise._core import Frame, InputError
 from linkwise.base import AnyArray, Array
 from linkwise.drives import as_drive, as_wrench
 from linkwise.drives.course import Span
+from linkwise.io.complaint import shown
 from linkwise.loads.engineering import joint_directions
 from linkwise.notes import Ignored, tell, warning_attrs, warnings_of
 from linkwise.record.claim import check_target
@@ -70,6 +71,9 @@ def check_driven(
     """Drives by joint and wrenches by name, each with its frame; unknown names and unusable values
     are refused."""
     by_joint, by_name = {}, {}
+    for name, given in (("drives", drives), ("wrenches", wrenches)):
+        if given is not None and not isinstance(given, Mapping):
+            raise InputError(f"{name}: {shown(given)} given; give a dictionary by name")
     for joint, drive in (drives or {}).items():
         model.joint_index(joint)
         try:
@@ -340,7 +344,7 @@ def simulate(
         extremes=recording.keeps_extremes(model.n_joints),
     )
     if on_failure not in ("raise", "return"):
-        raise InputError(f'on_failure: {on_failure!r} is unknown; use "raise" or "return"')
+        raise InputError(f'on_failure: {shown(on_failure)} is unknown; use "raise" or "return"')
     if output is not None:
         check_target(output)
         output = os.path.abspath(output)  # a function of the caller's may change the folder

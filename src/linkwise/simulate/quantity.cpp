@@ -1,6 +1,7 @@
 #include "linkwise/simulate/quantity.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -134,6 +135,17 @@ void Sample::write(const Model& model, size_t member, const Instant* instant) co
     else
       std::fill_n(values[k] + offset, width, std::numeric_limits<double>::quiet_NaN());
   }
+}
+
+std::string_view Sample::not_finite(const Model& model, size_t member) const {
+  for (size_t k = 0; k < std::size(table); ++k) {
+    if (!values[k]) continue;
+    const size_t width = quantity_width(table[k], model);
+    const double* row = values[k] + member * rows * width;
+    if (!std::all_of(row, row + width, [](double x) { return std::isfinite(x); }))
+      return table[k].name;
+  }
+  return {};
 }
 
 }  // namespace linkwise

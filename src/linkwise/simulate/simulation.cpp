@@ -19,12 +19,6 @@ constexpr double largest_acceleration = 1e100;
 
 constexpr double whole_turn = 2 * std::numbers::pi;
 
-bool finite(const double* values, size_t n) {
-  double sum = 0;
-  for (size_t i = 0; i < n; ++i) sum += 0.0 * values[i];
-  return sum == 0;
-}
-
 }  // namespace
 
 Simulation::Simulation(std::shared_ptr<const Model> model, SimulationOptions options)
@@ -483,7 +477,6 @@ bool Simulation::write_sample(double t, const Sample& sample) {
   }
   const SimulationStatistics now = statistics();
   for (size_t i = 0; i < members_; ++i) {
-    if (endings_[i].ok()) check_sample(t, i, sample);
     const Instant at{model(),
                      y_.data() + i * nq(),
                      rates_in(y_.data()) + i * nv(),
@@ -495,29 +488,24 @@ bool Simulation::write_sample(double t, const Sample& sample) {
                      now};
     const bool running = endings_[i].ok();
     sample.write(model(), i, running ? &at : nullptr);
-    if (running) endings_[i].time = t;
+    if (running) check_sample(t, i, sample);
   }
   return any_running();
 }
 
-/// Ends a member with values that are no numbers. Products of huge rates overflow in loads before
-/// rates do.
+/// Ends a member whose row holds what is no number: products of huge values overflow in loads and
+/// energies before states do.
 void Simulation::check_sample(double t, size_t member, const Sample& sample) {
-  const double* y = y_.data();
-  std::string_view wrong;
-  if (sample.needs(Needs::loads) && !finite(loads_.data() + member * n_load(), n_load()))
-    wrong = "joint_load";
-  if (sample.needs(Needs::forces)) {
-    if (!finite(forces_->drive(member), nv())) wrong = "drive_torque";
-    if (!finite(du_.data() + member * nv(), nv())) wrong = "acceleration";
+  const std::string_view wrong = sample.not_finite(model(), member);
+  if (wrong.empty()) {
+    endings_[member].time = t;
+    return;
   }
-  if (!finite(rates_in(y) + member * nv(), nv())) wrong = "velocity";
-  if (!finite(y + member * nq(), nq())) wrong = "position";
-  if (wrong.empty()) return;
   endings_[member] = {Outcome::not_finite, t, "",
                       std::string(wrong) +
                           " is not finite; check masses, inertias, drives and the state for values "
                           "that are far too large"};
+  sample.write(model(), member, nullptr);
 }
 
 /// The drive torques of joints of given motion: what the motion takes, less what acts by itself.

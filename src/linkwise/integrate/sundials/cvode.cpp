@@ -228,6 +228,8 @@ Outcome Cvode::classify(int flag) const {
     case CV_CONV_FAILURE:
     case CV_LSETUP_FAIL:
     case CV_LSOLVE_FAIL:
+    case CV_ILL_INPUT:  // of a step: times too close together to choose one
+    case CV_TOO_CLOSE:
       return no_smaller_step();
     default:
       check(flag, "CVode");
