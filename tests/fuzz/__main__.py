@@ -96,7 +96,8 @@ class Worker:
             if not self.ended:
                 found.append((*(self.current or ("start", 0)), f"worker ended with code {code}"))
             self.ended = True
-        if not self.ended and time.monotonic() - self.since > FUSE:
+        running = self.current is not None and not self.ended
+        if running and time.monotonic() - self.since > FUSE:
             self.process.kill()
             found.append((*self.current, f"takes longer than {FUSE:g} s"))
             self.ended = True
