@@ -147,7 +147,13 @@ def test_messages_say_merged(tmp_path):
         read.simulate_arguments(read.load_model())
 
 
-METHODS = ("auto", "constraint_force", "composite_rigid_body", "global_projection")
+METHODS = (
+    "auto",
+    "constraint_force",
+    "composite_rigid_body",
+    "global_projection",
+    "joint_space_conjugate_gradient",
+)
 
 
 @pytest.mark.parametrize("method", METHODS)

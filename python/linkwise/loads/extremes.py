@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from linkwise._core import InputError
 from linkwise.base import DERIVED, AnyArray, Array
 from linkwise.loads.samples import rows
 
@@ -54,13 +55,25 @@ def extremes_of(run: RunLike, name: str) -> Extremes | None:
     or its process was killed before the first were written."""
     if _PREFIX + name not in run.dataset:
         return None
-    values = rows(run, _PREFIX + name, slice(None))
+    values = _rows(run, name, len(fields(Extremes)))
     return None if np.isnan(values).all() else Extremes(*values)
+
+
+def _rows(run: RunLike, name: str, count: int) -> Array:
+    """The `count` rows of one variable; InputError where the run has others or none."""
+    held = run.dataset.get(_PREFIX + name)
+    if held is None or held.shape[:1] != (count,):
+        shown = f"run {str(run.path)!r}" if run.path is not None else "run"
+        raise InputError(
+            f"{shown}: {_PREFIX}{name} is missing or has another shape than it was written with; "
+            "its files are damaged, simulate again"
+        )
+    return rows(run, _PREFIX + name, slice(None))
 
 
 def load_at_extremes(run: RunLike) -> Array:
     """The whole load (quantity, joint, component) when each quantity was largest in magnitude."""
-    wrench = rows(run, f"{_PREFIX}wrench", slice(None))
+    wrench = _rows(run, "wrench", 2)
     found = extremes_of(run, "quantity")
     assert found is not None
     load: Array = np.where(found.is_minimum[..., None], wrench[0], wrench[1])

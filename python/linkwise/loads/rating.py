@@ -73,7 +73,8 @@ def margins(
     Args:
         summary: Of `linkwise.loads.summary`.
         ratings: By joint name.
-        plus_minus: Error bounds (quantity, joint) of the peaks, which count against the margin.
+        plus_minus: Error bounds (quantity, joint) of the peaks. They count against the margin, and
+            so does what peaks may have missed (`sampling` of the summary).
 
     Returns:
         Dataset over (quantity, joint): `rating`, `use` (peak with its bound over the rating) and
@@ -91,7 +92,7 @@ def margins(
         )
     peak = np.abs(summary["peak"].values)
     if plus_minus is not None:
-        peak = peak + plus_minus.values
+        peak = peak + plus_minus.values + summary["sampling"].values
     with np.errstate(divide="ignore"):
         margin = table / peak - 1
     dims = ("quantity", "joint")

@@ -95,6 +95,7 @@ class Scenario(ScenarioSource):
             "record": {
                 "quantities": builder.quantities(),
                 "joints": builder.joints(),
+                "extremes": output.extremes,
                 "scenario_text": self.text,
             },
             "output": self._output_path(),

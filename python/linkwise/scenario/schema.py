@@ -340,6 +340,7 @@ class OutputSection(Section):
     every: Time | None = None
     quantities: list[str] | None = None
     joints: list[str] | None = None
+    extremes: bool | None = None
     path: str | None = None
 
 

@@ -16,7 +16,7 @@ constexpr OutcomeEntry table[] = {
     {Outcome::not_finite, "not_finite",
      "a number in the state, the system or the iteration is not finite",
      "check masses, inertias, drives and the state for values that are infinite or far too large, "
-     "look for an unstable drive, or take a smaller step"},
+     "and look for an unstable drive"},
     {Outcome::stagnated, "stagnated",
      "rounding errors keep the iteration from meeting the tolerance",
      "loosen the tolerance, or use the articulated_body method, which loses no digits on long "

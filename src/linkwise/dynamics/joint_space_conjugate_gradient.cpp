@@ -85,8 +85,10 @@ double JointSpaceConjugateGradient::error(const SweepInput<double>& in) {
   rest.q = in.q;
   rest.tau = tau_.data();
   rest.gravity_factor = 0;
-  if (!recursion_.evaluate(rest, correction_.data(), nullptr))
+  if (!recursion_.evaluate(rest, correction_.data(), nullptr)) {
+    failed_body_ = recursion_.failed_body();
     return std::numeric_limits<double>::quiet_NaN();
+  }
   double square = 0;
   for (int k = 0; k < columns_.count(); ++k) square += residual_[k] * correction_[columns_.dof(k)];
   return std::sqrt(std::max(0.0, square));
@@ -113,6 +115,7 @@ Report JointSpaceConjugateGradient::solve(const SweepInput<double>& in) {
         options_.executor);
     report = {stop_.outcome(), report.iterations + stop_.iterations(), stop_.relative_error()};
     const double off = error(in);
+    if (failed_body_ >= 0) report.outcome = Outcome::not_positive_definite;  // H is singular
     if (!std::isfinite(off)) return report;
     const double energy = std::sqrt(std::max(0.0, dot(x_, b_)));
     report.error_estimate = energy > 0.0 ? off / energy : off;
@@ -135,6 +138,7 @@ DynamicsReport JointSpaceConjugateGradient::evaluate(double, const SweepInput<do
                                                      double* du, double* loads) {
   const Model& model = *model_;
   DynamicsReport report;
+  failed_body_ = -1;
   for (int i = 0; i < model.nv(); ++i) du[i] = 0;
   for (int n = 0; n < model.n_bodies(); ++n) copy_prescribed(model, model.topology[n], in, du);
   inverse_.evaluate(in, du, tau_.data(), nullptr);
@@ -149,6 +153,7 @@ DynamicsReport JointSpaceConjugateGradient::evaluate(double, const SweepInput<do
     x_[k] = 0;
   }
   if (sum_of_squares(b_) != 0.0) static_cast<Report&>(report) = solve(in);
+  report.body = failed_body_;
   for (int k = 0; k < columns_.count(); ++k) du[columns_.dof(k)] = x_[k];
   if (loads) inverse_.evaluate(in, du, nullptr, loads);
   return report;

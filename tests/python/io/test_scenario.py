@@ -56,7 +56,12 @@ def test_defaults(write):
         "q0": None,
         "v0": None,
         "every": None,
-        "record": {"quantities": None, "joints": None, "scenario_text": path.read_text()},
+        "record": {
+            "quantities": None,
+            "joints": None,
+            "extremes": None,
+            "scenario_text": path.read_text(),
+        },
         "output": None,
     }
 
@@ -95,6 +100,7 @@ def test_everything(write, arm):
         max_step = "100 ms"
         threads = 2
         [output]
+        extremes = false
         every = 0.01
         quantities = ["joint_load", "energy"]
         joints = ["slide"]
@@ -122,6 +128,7 @@ def test_everything(write, arm):
     assert given["every"] == 0.01
     assert given["record"]["quantities"] == ["joint_load", "energy"]
     assert given["record"]["joints"] == ["slide"]
+    assert given["record"]["extremes"] is False
     assert given["output"] == path.parent / "results" / "run.zarr"
 
 

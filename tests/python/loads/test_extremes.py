@@ -56,6 +56,22 @@ def test_pendulum_let_go_horizontally():
     assert float(lw.loads.peak_loads(run).force[0]) == float(found.peak.sel(quantity="force"))
 
 
+@pytest.mark.parametrize("lost", ["extreme_wrench", "extreme_quantity"])
+def test_a_part_that_is_lost_is_no_reason_to_guess(lost):
+    run = lw.simulate(**falling(), every=0.6)
+    without = lw.Run(run.dataset.drop_vars(lost), model=pendulum())
+    if lost == "extreme_wrench":
+        with pytest.raises(lw.InputError, match="extreme_wrench is missing or has another shape"):
+            lw.loads.summary(without)
+    else:
+        assert lw.loads.summary(without).attrs["extremes"] != "along the steps"
+    held = run.dataset[lost]
+    short = held[:1].rename({held.dims[0]: "row"}).drop_vars("row", errors="ignore")
+    damaged = lw.Run(run.dataset.assign({lost: short}), model=pendulum())
+    with pytest.raises(lw.InputError, match=f"{lost} is missing or has another shape"):
+        lw.loads.summary(damaged)
+
+
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
 def test_a_stiff_stop_hits_as_hard_at_any_sampling(tolerance):
     """The samples of the default run miss most of the blow."""

@@ -224,6 +224,10 @@ def test_margins():
     assert float(left.margin.sel(quantity="radial")) == pytest.approx(1.0)
     assert float(left.margin.sel(quantity="torque")) == pytest.approx(-0.5)
     assert np.isnan(left.margin.sel(quantity="force"))
+    bound = found.peak.copy(data=np.full(found.peak.shape, 0.5 * G))
+    missed = found.assign(sampling=found.peak.copy(data=np.full(found.peak.shape, 0.5 * G)))
+    use = lw.loads.margins(missed, ratings, bound).use.sel(joint="root", quantity="radial")
+    assert float(use) == pytest.approx((3 + 0.5 + 0.5) / 6)
     with pytest.raises(lw.InputError, match=r"rating for joint 'rot'.*did you mean 'root'"):
         lw.loads.margins(found, {"rot": lw.loads.Rating(force=1)})
     with pytest.raises(lw.InputError, match="positive number"):
