@@ -1,5 +1,8 @@
 """What cannot fit into memory is refused before any work, with the estimate."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -45,3 +48,17 @@ def test_recordings(tmp_path):
         lambda: lw.simulate_batch(arm, q0=np.zeros((10_000, arm.nq)), times=times, step=1e-3),
         rf"1000000 samples of 10000 members {NEEDS}",
     )
+
+
+def test_a_limit_of_steps_is_no_memory():
+    """What the limit would allow is not taken beforehand."""
+    code = """
+import resource
+import linkwise as lw
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+model = lw.scenes.chain(5)
+system = lw.ConstraintSystem(model, model.neutral_configuration())
+print(system.spectrum(max_steps=2**31 - 1).converged)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "True", done.stderr

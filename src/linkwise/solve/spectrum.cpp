@@ -48,12 +48,13 @@ Spectrum SpectrumEstimator::estimate(const ScaledTree& system, const SpectrumOpt
   const std::size_t n = static_cast<std::size_t>(size);
   Spectrum result;
   if (size == 0) return result;
-  const int limit = options.max_steps > 0 ? options.max_steps : std::min(2 * size + 50, 2000);
+  const int usual = std::min(2 * size + 50, 2000);
+  const int limit = options.max_steps > 0 ? options.max_steps : usual;
   for (std::vector<double>* v : {&v_, &previous_, &w_}) v->resize(n);
   diagonal_.clear();
   off_diagonal_.clear();
-  diagonal_.reserve(limit);
-  off_diagonal_.reserve(limit);
+  diagonal_.reserve(std::min(limit, usual));
+  off_diagonal_.reserve(std::min(limit, usual));
   // A start vector with a share of every mode, the same on every call.
   for (std::size_t i = 0; i < n; ++i) v_[i] = 1.0 + 0.5 * std::sin(1.7 * static_cast<double>(i));
   const double length = std::sqrt(sum_of_squares(v_));
