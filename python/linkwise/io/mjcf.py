@@ -47,7 +47,8 @@ def read_mjcf(
     builder = ModelBuilder(stem, gravity=gravity, source=file_name(path))
     try:
         added = Transmissions(mj_model)
-        _add_bodies(builder, mj_model, names, added)
+        with np.errstate(all="ignore"):  # the builder refuses what is no number, with its name
+            _add_bodies(builder, mj_model, names, added)
         notes = [*_ignored(mj_model), *added.notes(), *_joint_notes(mj_model, names)]
         for level, element, text in notes:
             builder.add_note(level, element, text)

@@ -128,7 +128,7 @@ class Scenario(ScenarioSource):
                 )
         try:
             return function(**options)
-        except InputError as error:
+        except (InputError, MemoryError) as error:
             raise InputError(f"{shorten(self.path, 400)}: model.{kind}: {error}") from None
         except (TypeError, ValueError, ArithmeticError) as error:
             self.complain(("model", kind), shorten(error, 120), "check the types of its values")

@@ -225,11 +225,16 @@ BODY = (
             ": body 'a': pos is not finite; give finite numbers",
         ),
         (
+            BODY.format("", '0 0 1"/><joint pos="0 0 inf', "0.1", ""),
+            ": link 'a': centre of mass is not finite; give three finite numbers in m",
+        ),
+        (
             '<!DOCTYPE mujoco [<!ENTITY x "y">]><mujoco model="&x;"/>',
             ":1: DOCTYPE: document type and entity definitions are not allowed in a model file; ",
         ),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_defect_is_named(write, complaint, capfd, monkeypatch, tmp_path, text, expected):
     monkeypatch.chdir(tmp_path)
     path = write(text)

@@ -38,6 +38,10 @@ def write(tmp_path):
         (f"[model.tree]\nbranching = 3000000000\n{RUN}", "model.tree: branching is 3000000000"),
         (f"[model.srms]\npayload_mass = []\n{RUN}", "model.srms: payload_mass is []"),
         (f"[model.chain]\nn_bodies = 3000000000\n{RUN}", "model.chain: n_bodies is 3000000000"),
+        (
+            "[model.chain]\nn_bodies = 2147483647\n" + RUN,
+            "model.chain: a machine of 2147483647 bod",
+        ),
         (f"{CHAIN}{RUN}max_iterations = 3000000000", "simulate.max_iterations: is 3000000000"),
         (f"{CHAIN}{RUN}threads = 3000000000", "simulate.threads: is 3000000000"),
         (f"{CHAIN}{RUN}max_steps = 3000000000", "simulate.max_steps: is 3000000000"),
