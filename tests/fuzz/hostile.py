@@ -51,7 +51,7 @@ NUMBERS = (
 WHOLE = (0, 1, 2, -1, 3, 7, 255, 2**31 - 1, 2**31, 2**32, 2**63, -(2**63), 10**30, 10**400)
 OBJECTS = (
     *(None, True, False, "2", b"2", "", (), [], {}, {"a": 1}, {1, 2}, 2 + 1j, Decimal("1.5")),
-    *(Fraction(1, 3), datetime.datetime(2020, 1, 1), datetime.timedelta(1), object(), len, float),
+    *(Fraction(1, 3), datetime.datetime(2020, 1, 1), datetime.timedelta(1), object(), repr, float),
     *(np.int64(2), np.float32(1.5), np.bool_(True), np.datetime64("NaT"), np.str_("a"), range(3)),
     *(iter(()), Ellipsis, NotImplemented, slice(1), np.ma.masked, [[1, 2], [3]], ["a"], [None]),
 )
