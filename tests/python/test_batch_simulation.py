@@ -187,3 +187,13 @@ def test_members_that_simulations_cannot_share_evenly():
         _core.simulate_members(
             simulations, q0=rows, v0=rows, tau=None, times=[0.0], quantities=["position"]
         )
+
+
+def test_loads_of_a_batch_are_those_of_its_members():
+    model = lw.scenes.chain(3)
+    batch = lw.simulate_batch(model, q0=np.zeros((2, 3)), duration=0.1, step=0.01)
+    for use in (lw.loads.summary, lw.loads.envelope, lw.loads.energy_balance, lw.loads.quantities):
+        with pytest.raises(lw.InputError, match=r"is a Dataset; give a linkwise\.Run\. One member"):
+            use(batch)
+    member = lw.loads.summary(lw.Run(batch.isel(member=1), model=model))
+    assert np.isfinite(member.peak.sel(quantity="force")).all()

@@ -334,9 +334,9 @@ def _margin_table(rated: list[dict[str, Any]]) -> Any:
 def _share_table(shares: list[dict[str, Any]]) -> Any:
     fixed = ("joint", "quantity", "unit", "time", "peak")
     causes = [key for key in shares[0] if key not in fixed]
-    headings = [("joint", "left"), ("of the peak", "left"), ("at [s]", "right"), ("peak", "right")]
+    headings = [("joint", "left"), ("of the peak", "left"), ("at [s]", "right"), ("load", "right")]
     result = table(
-        "By cause, along the peak force or moment; the shares add up to it",
+        "By cause, at the sample after the peak, along the load there; the shares add up to it",
         [*headings, *((name, "right") for name in causes)],
     )
     for record in shares:

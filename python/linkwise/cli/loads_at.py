@@ -45,17 +45,50 @@ def show_at(
 
     found = in_frame(run, at if point is None else Frame(at, point), joint=joints, model=model)
     records = records_at(found)
+    higher = higher_between(run, records)
     if csv is not None:
         write_csv(records, csv)
     if as_json:
         about = {key: found.attrs[key] for key in ("frame", "point", "convention")}
-        print_json({"run": str(run.path), "at": about, "loads": records, "warnings": run.warnings})
+        about["extremes"] = "of the samples"
+        warnings = [*run.warnings, *higher]
+        print_json({"run": str(run.path), "at": about, "loads": records, "warnings": warnings})
         return
     screen = console()
     screen.print(_table_at(records, found.attrs))
-    say_warnings(run.warnings)
+    say_warnings([*run.warnings, *higher])
     if csv is not None:
         screen.print(f"Written: {csv}", markup=False)
+
+
+def higher_between(run: Run, records: list[dict[str, Any]]) -> list[dict[str, str]]:
+    """Warnings where forces, which are as large at any point, peak higher between the samples."""
+    from linkwise.loads import peak_loads
+
+    peaks = peak_loads(run)
+    force = dict(zip(peaks["joint"].values.tolist(), peaks["force"].values.tolist(), strict=True))
+    at_samples = {r["joint"]: r["peak"] for r in records if r["quantity"] == "force"}
+    higher = [j for j, size in at_samples.items() if force.get(j, 0.0) > 1.001 * size]
+    # A fixed joint hangs on one that moves, whose peak it may share.
+    inside = [j for j in force if force[j] > 1.001 * _sampled_force(run, j)]
+    fixed = [j for j in at_samples if j not in force]
+    if not higher and not (fixed and inside):
+        return []
+    worst = max(higher or inside, key=lambda j: force[j])
+    return [
+        {
+            "element": f"joint {worst!r}",
+            "text": f"force peaks between the samples, at {force[worst]:.4g} N; what stands here "
+            "is of the samples: simulate with more of them (every)",
+        }
+    ]
+
+
+def _sampled_force(run: Run, joint: str) -> float:
+    from linkwise.base import lengths
+
+    load = run.dataset["joint_load"].sel(joint=joint).values
+    return float(lengths(load[..., :3]).max())
 
 
 def records_at(found: xr.DataArray) -> list[dict[str, Any]]:
@@ -93,7 +126,8 @@ def _table_at(records: list[dict[str, Any]], about: dict[str, str]) -> Any:
     by_joint: dict[str, list[dict[str, Any]]] = {}
     for record in records:
         by_joint.setdefault(record["joint"], []).append(record)
-    title = f"Largest loads, inboard on outboard body; {about['frame']}, about {about['point']}"
+    where = f"{about['frame']}, about {about['point']}"
+    title = f"Largest loads at the samples, inboard on outboard body; {where}"
     if len(by_joint) == 1:
         headings = [("quantity", "left"), ("peak", "right"), ("at [s]", "right")]
         headings += [(name, "right") for name in ("minimum", "maximum")]

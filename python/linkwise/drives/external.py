@@ -45,6 +45,8 @@ def external_wrenches(
     for k, force, moment in placed:
         total[..., k, :3] += force
         total[..., k, 3:] += moment
+    if not np.isfinite(total).all():
+        raise InputError("wrenches: their sum at a joint is not finite; give smaller numbers")
     return total
 
 
@@ -67,6 +69,7 @@ def _on_body(
         raise InputError(f"{name}: is fixed to the ground, where a wrench moves nothing")
     # Components of the wrench -> components in the joint frame.
     turn = np.swapaxes(poses[..., bodies[body], :3, :3], -1, -2) if along_world else axes
-    force = (turn @ given[..., :3, None])[..., 0]
-    moment = (turn @ given[..., 3:, None])[..., 0] + np.cross(origin, force)
+    with np.errstate(all="ignore"):  # the sum is looked at
+        force = (turn @ given[..., :3, None])[..., 0]
+        moment = (turn @ given[..., 3:, None])[..., 0] + np.cross(origin, force)
     return bodies[body], force, moment

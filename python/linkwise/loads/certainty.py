@@ -126,11 +126,13 @@ class _BetweenSamples:
         for one, other in (both, both[::-1]):
             assert one is not None
             assert other is not None
-            for value, when, twin in (
-                (one.minimum, one.minimum_time, other.minimum),
-                (one.maximum, one.maximum_time, other.maximum),
+            for value, when, twin, reach in (
+                (one.minimum, one.minimum_time, other.minimum, other.minimum_reach),
+                (one.maximum, one.maximum_time, other.maximum, other.maximum_reach),
             ):
-                self._found.append((value[which], np.abs(value - twin)[which]))
+                # What the other run did not find may lie further away.
+                apart = np.fmax(np.abs(value - twin), np.abs(value - reach))
+                self._found.append((value[which], apart[which]))
                 self._after.append(np.searchsorted(times, when[which]).clip(max=times.size - 1))
 
     def add(self, k: int, where: slice, running: Array) -> None:

@@ -42,8 +42,17 @@ class RunLike(Protocol):
     def load_model(self) -> Model: ...
 
 
+def _require_run(run: object) -> None:
+    if not (hasattr(run, "dataset") and hasattr(run, "load_model")):
+        raise InputError(
+            f"run: is a {type(run).__name__}; give a linkwise.Run. One member of a batch is "
+            "linkwise.Run(batch.isel(member=0), model=model)"
+        )
+
+
 def need(run: RunLike, *names: str) -> None:
     """InputError where the run lacks one of these variables, or samples."""
+    _require_run(run)
     for name in names:
         if name not in run.dataset:
             raise InputError(f'run holds no {name}; record the quantity "{name}"')
@@ -74,6 +83,7 @@ def model_of(run: RunLike, model: Model | None) -> Model:
     that does not hold its model is told apart by its hash alone, which is a warning, because a
     newer linkwise may describe the same machine differently.
     """
+    _require_run(run)
     own = held_model(run)
     if model is None or model is own:
         return run.load_model()

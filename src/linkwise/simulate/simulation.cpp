@@ -427,10 +427,11 @@ std::vector<double> Simulation::extremes(size_t member) {
 }
 
 /// A method of order p resolves the motion up to the power p of time; of given motions, which are
-/// not integrated, it says nothing: 0. Functions of the caller's may cost more than all the rest:
-/// there the quadrature alone is as good.
+/// not integrated, it says nothing: 0. A fixed step is the user's, who knows them. Functions of the
+/// caller's may cost more than all the rest: there the quadrature alone is as good.
 int Simulation::nodes_of_work() const {
-  if (setup_->any_motion()) return 0;
+  const bool fixed_step = find_integrator(setup_->options.integrator).fixed_step;
+  if (setup_->any_motion() && !fixed_step) return 0;
   const int order = statistics().last_order;
   return setup_->calls_functions() ? order / 2 + 2 : order + 2;
 }

@@ -113,7 +113,9 @@ Report CheckedSolver::solve(const BlockTree& A, std::span<const double> b, std::
       motion = recover(true);
       motion.size = std::max(motion.size, size);
       const double rest = std::sqrt(std::max(0.0, motion.gap * motion.gap - off * off));
-      excess = std::max(excess, rest / (asked.relative * motion.size + asked.absolute));
+      // The true motion may be smaller than the one found by its error.
+      const double least_motion = std::max(0.0, motion.size - rest);
+      excess = std::max(excess, rest / (asked.relative * least_motion + asked.absolute));
     }
     // What an iteration could not finish is believed where it is as good as was asked for.
     if (excess <= (done || strictness.rounds() > 0 ? Strictness::slack : 1.0)) {

@@ -279,3 +279,20 @@ def test_what_is_no_frame_is_named(linkwise, wrist, options, complaint):
     result = linkwise("loads", wrist, *options)
     assert result.code == 2
     assert complaint in result.err
+
+
+def test_peaks_between_the_samples_are_said_at_other_frames(linkwise, tmp_path):
+    """A fall onto a stiff stop: no sample of twelve meets the blow."""
+    builder = lw.ModelBuilder("falling")
+    builder.add_link("base")
+    builder.add_link("rod", mass=1.0, com=(1, 0, 0), inertia=np.eye(3) * 0.01)
+    limits = {"lower": -1.0, "upper": 0.5, "limit_stiffness": 1e6}
+    builder.add_joint("hinge", "revolute", "base", "rod", axis=(0, 1, 0), **limits)
+    store = tmp_path / "f.zarr"
+    lw.simulate(builder.build(), duration=1.0, every=0.09, output=store)
+    said = linkwise("loads", str(store), "--at", "rod", "--json").json
+    assert said["at"]["extremes"] == "of the samples"
+    peak = float(lw.loads.peak_loads(lw.open_run(store)).force[0])
+    warned = [w["text"] for w in said["warnings"] if "between the samples" in w["text"]]
+    assert len(warned) == 1
+    assert f"{peak:.4g} N" in warned[0]
