@@ -139,7 +139,7 @@ void Sample::write(const Model& model, size_t member, const Instant* instant) co
 
 std::string_view Sample::not_finite(const Model& model, size_t member) const {
   for (size_t k = 0; k < std::size(table); ++k) {
-    if (!values[k]) continue;
+    if (!values[k] || table[k].needs == Needs::works) continue;  // works may be unknown
     const size_t width = quantity_width(table[k], model);
     const double* row = values[k] + member * rows * width;
     if (!std::all_of(row, row + width, [](double x) { return std::isfinite(x); }))
