@@ -118,7 +118,8 @@ class _BetweenSamples:
         which, times = quantity_rows(names), run.dataset["time"].values
         both = extremes_of(run, "quantity"), extremes_of(tighter, "quantity")
         self.peak = np.zeros((len(names), len(joint_names(run))))
-        self._found: list[tuple[Array, Array]] = []  # values, distances to the other run's extreme
+        # Values, distances to the other run's extreme, what the tighter run may have missed.
+        self._found: list[tuple[Array, Array, Array]] = []
         self._after: list[AnyArray] = []
         if both[0] is None or both[1] is None:
             return
@@ -126,18 +127,17 @@ class _BetweenSamples:
         for one, other in (both, both[::-1]):
             assert one is not None
             assert other is not None
-            for value, when, twin, reach in (
-                (one.minimum, one.minimum_time, other.minimum, other.minimum_reach),
-                (one.maximum, one.maximum_time, other.maximum, other.maximum_reach),
+            tight = both[1]
+            for value, when, twin, missed in (
+                (one.minimum, one.minimum_time, other.minimum, tight.minimum - tight.minimum_reach),
+                (one.maximum, one.maximum_time, other.maximum, tight.maximum_reach - tight.maximum),
             ):
-                # What the other run did not find may lie further away.
-                apart = np.fmax(np.abs(value - twin), np.abs(value - reach))
-                self._found.append((value[which], apart[which]))
+                self._found.append((value[which], np.abs(value - twin)[which], missed[which]))
                 self._after.append(np.searchsorted(times, when[which]).clip(max=times.size - 1))
 
     def add(self, k: int, where: slice, running: Array) -> None:
         """The distances of quantity k until each sample (time, joint) of one block."""
-        for (_, apart), after in zip(self._found, self._after, strict=True):
+        for (_, apart, _), after in zip(self._found, self._after, strict=True):
             joints = np.flatnonzero((after[k] >= where.start) & (after[k] < where.stop))
             until = running[after[k, joints] - where.start, joints]
             apart[k, joints] = np.fmax(apart[k, joints], until)
@@ -145,8 +145,8 @@ class _BetweenSamples:
     def reach(self) -> Array:
         """No true extreme is higher."""
         reach = np.zeros_like(self.peak)
-        for value, apart in self._found:
-            reach = np.fmax(reach, np.abs(value) + SAFETY * apart)
+        for value, apart, missed in self._found:
+            reach = np.fmax(reach, np.abs(value) + SAFETY * apart + missed)
         return reach
 
 
