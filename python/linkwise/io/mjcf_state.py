@@ -1,4 +1,4 @@
-"""MuJoCo's state vectors in linkwise's coordinates and back.
+"""MuJoCo's state vectors in linkwise's coordinates.
 
 What differs: MuJoCo writes quaternions w, x, y, z and linkwise x, y, z, w; MuJoCo's hinge and
 slide positions are ``ref`` in the pose drawn in the file, linkwise's are zero there; the linear
@@ -30,16 +30,11 @@ def xyzw_from_wxyz(quaternion: npt.ArrayLike) -> Array:
     return np.roll(as_floats(quaternion, "quaternion"), -1, axis=-1)
 
 
-def wxyz_from_xyzw(quaternion: npt.ArrayLike) -> Array:
-    """Quaternions (..., 4) from linkwise's order to MuJoCo's."""
-    return np.roll(as_floats(quaternion, "quaternion"), 1, axis=-1)
-
-
 def position_from_mujoco(model: Model, mj_model: Any, qpos: npt.ArrayLike) -> Array:
     """linkwise's q (nq,) of MuJoCo's qpos (mj_model.nq,)."""
-    source = _vector(qpos, mj_model.nq, "qpos")
+    source = vector_of(qpos, mj_model.nq, "qpos")
     q = np.array(model.neutral_configuration(), dtype=float)
-    for name, kind, theirs, _ in _joints(mj_model):
+    for name, kind, theirs, _ in joints_of(mj_model):
         ours = model.q_slice(name)
         values = source[theirs]
         if kind == "floating":
@@ -51,45 +46,18 @@ def position_from_mujoco(model: Model, mj_model: Any, qpos: npt.ArrayLike) -> Ar
     return q
 
 
-def position_to_mujoco(model: Model, mj_model: Any, q: npt.ArrayLike) -> Array:
-    """MuJoCo's qpos (mj_model.nq,) of linkwise's q (nq,)."""
-    source = _vector(q, model.nq, "q")
-    qpos = np.array(mj_model.qpos0, dtype=float)
-    for name, kind, theirs, _ in _joints(mj_model):
-        values = source[model.q_slice(name)]
-        if kind == "floating":
-            qpos[theirs] = [*values[:3], *wxyz_from_xyzw(values[3:])]
-        elif kind == "spherical":
-            qpos[theirs] = wxyz_from_xyzw(values)
-        else:
-            qpos[theirs] = values + mj_model.qpos0[theirs]
-    return qpos
-
-
 def velocity_from_mujoco(
     model: Model, mj_model: Any, qpos: npt.ArrayLike, qvel: npt.ArrayLike
 ) -> Array:
     """linkwise's v (nv,) of MuJoCo's qvel (mj_model.nv,) at qpos."""
-    positions, source = _vector(qpos, mj_model.nq, "qpos"), _vector(qvel, mj_model.nv, "qvel")
+    positions, source = vector_of(qpos, mj_model.nq, "qpos"), vector_of(qvel, mj_model.nv, "qvel")
     v = np.zeros(model.nv)
-    for name, kind, where, theirs in _joints(mj_model):
+    for name, kind, where, theirs in joints_of(mj_model):
         values = source[theirs].copy()
         if kind == "floating":
             values[:3] = rotation(positions[where][3:]).T @ values[:3]
         v[model.v_slice(name)] = values
     return v
-
-
-def velocity_to_mujoco(model: Model, mj_model: Any, qpos: npt.ArrayLike, v: npt.ArrayLike) -> Array:
-    """MuJoCo's qvel (mj_model.nv,) of linkwise's v (nv,), with the position as MuJoCo's qpos."""
-    positions, source = _vector(qpos, mj_model.nq, "qpos"), _vector(v, model.nv, "v")
-    qvel = np.zeros(mj_model.nv)
-    for name, kind, where, theirs in _joints(mj_model):
-        values = source[model.v_slice(name)].copy()
-        if kind == "floating":
-            values[:3] = rotation(positions[where][3:]) @ values[:3]
-        qvel[theirs] = values
-    return qvel
 
 
 def acceleration_from_mujoco(
@@ -105,7 +73,7 @@ def acceleration_from_mujoco(
     """
     a = velocity_from_mujoco(model, mj_model, qpos, qacc)
     v = velocity_from_mujoco(model, mj_model, qpos, qvel)
-    for name, kind, *_ in _joints(mj_model):
+    for name, kind, *_ in joints_of(mj_model):
         if kind == "floating":
             first = model.v_slice(name).start
             linear, angular = v[first : first + 3], v[first + 3 : first + 6]
@@ -139,14 +107,14 @@ def read_keyframe(
             f"keyframe '{shorten(key)}' moves mocap bodies, which are fixed here; draw them there"
         )
     qpos = np.array(mj_model.key_qpos[index])
-    for _, kind, where, _ in _joints(mj_model):  # written with a few digits
+    for _, kind, where, _ in joints_of(mj_model):  # written with a few digits
         if kind in ("floating", "spherical"):
             qpos[where][-4:] /= np.linalg.norm(qpos[where][-4:])
     q = position_from_mujoco(model, mj_model, qpos)
     return q, velocity_from_mujoco(model, mj_model, qpos, mj_model.key_qvel[index])
 
 
-def _joints(mj_model: Any) -> Iterator[tuple[str, str, slice, slice]]:
+def joints_of(mj_model: Any) -> Iterator[tuple[str, str, slice, slice]]:
     """Name, type, part of qpos and part of qvel of each joint."""
     for joint, name in enumerate(Names(mj_model).joint):
         kind = int(mj_model.jnt_type[joint])
@@ -155,7 +123,7 @@ def _joints(mj_model: Any) -> Iterator[tuple[str, str, slice, slice]]:
         yield name, KINDS[kind], slice(q, q + nq), slice(v, v + nv)
 
 
-def _vector(values: npt.ArrayLike, size: int, name: str) -> Array:
+def vector_of(values: npt.ArrayLike, size: int, name: str) -> Array:
     array = as_floats(values, name)
     if array.shape != (size,):
         raise InputError(f"{name}: expected shape ({size},), given shape {array.shape}")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
+from helpers import mujoco_states
 from linkwise.io import mjcf_state
 
 mujoco = pytest.importorskip("mujoco")
@@ -141,8 +142,10 @@ def test_states_convert_there_and_back(machine, rng):
     q = mjcf_state.position_from_mujoco(model, mj_model, qpos)
     v = mjcf_state.velocity_from_mujoco(model, mj_model, qpos, qvel)
     assert q.shape == (model.nq,)
-    np.testing.assert_allclose(mjcf_state.position_to_mujoco(model, mj_model, q), qpos, rtol=1e-15)
-    back = mjcf_state.velocity_to_mujoco(model, mj_model, qpos, v)
+    np.testing.assert_allclose(
+        mujoco_states.position_to_mujoco(model, mj_model, q), qpos, rtol=1e-15
+    )
+    back = mujoco_states.velocity_to_mujoco(model, mj_model, qpos, v)
     np.testing.assert_allclose(back, qvel, rtol=1e-12, atol=1e-15)
     with pytest.raises(lw.InputError, match=r"qpos: expected shape \(15,\), given shape \(3,\)"):
         mjcf_state.position_from_mujoco(model, mj_model, [0, 0, 0])
@@ -152,7 +155,7 @@ def test_quaternion_orders():
     wxyz = np.array([[1.0, 2, 3, 4], [5, 6, 7, 8]])
     xyzw = mjcf_state.xyzw_from_wxyz(wxyz)
     np.testing.assert_array_equal(xyzw, [[2, 3, 4, 1], [6, 7, 8, 5]])
-    np.testing.assert_array_equal(mjcf_state.wxyz_from_xyzw(xyzw), wxyz)
+    np.testing.assert_array_equal(mujoco_states.wxyz_from_xyzw(xyzw), wxyz)
 
 
 def test_what_is_left_out_is_said(write):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
+from helpers import mujoco_states
 from linkwise.io import mjcf_state
 from linkwise.view.joint_sliders import angles_of, quaternion_of
 
@@ -78,7 +79,7 @@ def test_runs_and_batches_start_as_drawn(satellites):
         batch.position.values.reshape(-1, model.nq)[0],
     ):
         np.testing.assert_allclose(
-            mjcf_state.position_to_mujoco(model, mj_model, q), mj_model.qpos0, atol=1e-15
+            mujoco_states.position_to_mujoco(model, mj_model, q), mj_model.qpos0, atol=1e-15
         )
         placed = link_positions(model, q)
         for name in ("box", "chaser", "boom", "debris"):
