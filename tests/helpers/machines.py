@@ -24,6 +24,27 @@ def pendulum(distance=1.0):
     return builder.build()
 
 
+def stopped_rod(*, reach=1.0, inertia=0.01, **limits):
+    """1 kg at `reach` on a hinge, which falls onto the stop that `limits` describe."""
+    builder = lw.ModelBuilder("stopped rod")
+    builder.add_link("ground")
+    builder.add_link("rod", mass=1.0, com=(reach, 0, 0), inertia=inertia * np.eye(3))
+    builder.add_joint("hinge", "revolute", "ground", "rod", axis=(0, 1, 0), **limits)
+    return builder.build()
+
+
+def stopped_arm(stiffness=1e8):
+    """Two links that fall into a stiff stop."""
+    builder = lw.ModelBuilder("stopped")
+    builder.add_link("base")
+    builder.add_link("upper", mass=4.0, com=(0.2, 0, 0.1), inertia=np.diag([0.1, 0.2, 0.2]))
+    builder.add_link("fore", mass=2.0, com=(0.3, 0.1, 0), inertia=np.diag([0.05, 0.1, 0.1]))
+    limits = {"lower": -0.5, "upper": 0.5, "limit_stiffness": stiffness}
+    builder.add_joint("shoulder", "revolute", "base", "upper", axis=(0, 1, 0), **limits)
+    builder.add_joint("elbow", "revolute", "upper", "fore", axis=(0, 1, 0), translation=(0.5, 0, 0))
+    return builder.build()
+
+
 def rod_chain(n, *, gravity=DOWN_Y, floating=False):
     """n unit rods end to end along x, hinged about z."""
     builder = lw.ModelBuilder(f"{n} rods", gravity=gravity)

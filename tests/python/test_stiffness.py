@@ -7,7 +7,7 @@ import pytest
 
 import linkwise as lw
 from helpers.loaded_arm import arm
-from helpers.machines import rod_chain
+from helpers.machines import rod_chain, stopped_rod
 from linkwise.cli.progress import describe
 
 
@@ -123,21 +123,9 @@ def test_soft_machines_stay_with_adams(scene):
 
 
 def test_a_hard_stop_that_is_only_touched_stays_with_adams():
-    builder = lw.ModelBuilder("bouncer")
-    builder.add_link("ground")
-    builder.add_link("rod", mass=1.0, com=(0.5, 0, 0), inertia=0.1 * np.eye(3))
-    builder.add_joint(
-        "hinge",
-        "revolute",
-        "ground",
-        "rod",
-        axis=(0, 1, 0),
-        lower=-9.0,
-        upper=1.0,
-        limit_stiffness=1e8,
-        limit_damping=0.1,
-    )
-    run = lw.simulate(builder.build(), times=[15.0], record=["position"])
+    limits = {"lower": -9.0, "upper": 1.0, "limit_stiffness": 1e8, "limit_damping": 0.1}
+    machine = stopped_rod(reach=0.5, inertia=0.1, **limits)
+    run = lw.simulate(machine, times=[15.0], record=["position"])
     assert run.attrs["total_evaluations"] > 7000
     assert stiff_notes(run) == []
 

@@ -45,50 +45,36 @@ def show_at(
 
     found = in_frame(run, at if point is None else Frame(at, point), joint=joints, model=model)
     records = records_at(found)
-    higher = higher_between(run, records)
+    between = peaks_between(run, records)
     if csv is not None:
         write_csv(records, csv)
     if as_json:
         about = {key: found.attrs[key] for key in ("frame", "point", "convention")}
         about["extremes"] = "of the samples"
-        warnings = [*run.warnings, *higher]
+        warnings = [*run.warnings, *between]
         print_json({"run": str(run.path), "at": about, "loads": records, "warnings": warnings})
         return
     screen = console()
     screen.print(_table_at(records, found.attrs))
-    say_warnings([*run.warnings, *higher])
+    say_warnings([*run.warnings, *between])
     if csv is not None:
         screen.print(f"Written: {csv}", markup=False)
 
 
-def higher_between(run: Run, records: list[dict[str, Any]]) -> list[dict[str, str]]:
-    """Warnings where forces, which are as large at any point, peak higher between the samples."""
-    from linkwise.loads import peak_loads
+def peaks_between(run: Run, records: list[dict[str, Any]]) -> list[dict[str, str]]:
+    """A warning where the loads of these joints peak between the samples."""
+    from linkwise.loads.extremes import missed_peaks
+    from linkwise.loads.samples import joint_names
 
-    peaks = peak_loads(run)
-    force = dict(zip(peaks["joint"].values.tolist(), peaks["force"].values.tolist(), strict=True))
-    at_samples = {r["joint"]: r["peak"] for r in records if r["quantity"] == "force"}
-    higher = [j for j, size in at_samples.items() if force.get(j, 0.0) > 1.001 * size]
-    # A fixed joint hangs on one that moves, whose peak it may share.
-    inside = [j for j in force if force[j] > 1.001 * _sampled_force(run, j)]
-    fixed = [j for j in at_samples if j not in force]
-    if not higher and not (fixed and inside):
+    asked = {record["joint"] for record in records}
+    # A fixed joint hangs on ones that move, whose peaks it may share.
+    missed = missed_peaks(run, asked if asked <= set(joint_names(run)) else None)
+    if not missed:
         return []
-    worst = max(higher or inside, key=lambda j: force[j])
-    return [
-        {
-            "element": f"joint {worst!r}",
-            "text": f"force peaks between the samples, at {force[worst]:.4g} N; what stands here "
-            "is of the samples: simulate with more of them (every)",
-        }
-    ]
-
-
-def _sampled_force(run: Run, joint: str) -> float:
-    from linkwise.base import lengths
-
-    load = run.dataset["joint_load"].sel(joint=joint).values
-    return float(lengths(load[..., :3]).max())
+    # Forces are as large at any point; moments are not.
+    worst = next((one for one in missed if one.quantity == "force"), missed[0])
+    text = f"{worst}; what stands here is of the samples: simulate with more of them (every)"
+    return [{"element": "samples", "text": text}]
 
 
 def records_at(found: xr.DataArray) -> list[dict[str, Any]]:

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from linkwise._core import InputError
-from linkwise.base import DERIVED, AnyArray, Array
-from linkwise.loads.samples import rows
+from linkwise.base import DERIVED, HALVES, AnyArray, Array, lengths
+from linkwise.loads.samples import blocks, joint_names, rows
 
 if TYPE_CHECKING:
     from linkwise.loads.samples import RunLike
 
 _PREFIX = "extreme_"
+
+# The share of a peak that samples may miss before it is said.
+MISSED = 0.01
+# Peaks below this share of the machine's largest are noise.
+_NOISE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -83,3 +89,59 @@ def load_at_extremes(run: RunLike) -> Array:
 def quantity_rows(names: list[str]) -> list[int]:
     """Where derived quantities stand among those of `extremes_of(run, "quantity")`."""
     return [DERIVED.index(name) for name in names]
+
+
+class MissedPeak(NamedTuple):
+    """A peak of a joint's force or moment that lies between the samples, and their largest."""
+
+    joint: str
+    quantity: str
+    units: str
+    peak: float
+    time: float
+    sampled: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.quantity} of joint {self.joint!r} peaks between the samples, at "
+            f"{self.peak:.4g} {self.units} and {self.time:.4g} s; the samples show at most "
+            f"{self.sampled:.4g} {self.units}"
+        )
+
+
+def missed_peaks(run: RunLike, joints: Collection[str] | None = None) -> list[MissedPeak]:
+    """The peaks of these joints, all by default, of which the samples miss more than `MISSED`.
+
+    The one that they miss most of comes first. None where the run holds no extremes: what its
+    samples miss is not known.
+    """
+    between = extremes_of(run, "quantity")
+    if between is None:
+        return []
+    names = joint_names(run)
+    sampled = np.zeros((len(HALVES), len(names)))
+    for where in blocks(run, 48 * len(names)):
+        load = rows(run, "joint_load", where).reshape(-1, len(names), 2, 3)
+        sampled = np.maximum(sampled, lengths(load).max(axis=0).T)
+    which = quantity_rows([name for name, _, _ in HALVES])
+    peak, time = between.maximum[which], between.maximum_time[which]
+    found = [
+        MissedPeak(names[j], name, units, peak[k, j], time[k, j], sampled[k, j])
+        for k, (name, units, _) in enumerate(HALVES)
+        for j in np.flatnonzero(
+            (sampled[k] < (1 - MISSED) * peak[k]) & (peak[k] > _NOISE * peak[k].max(initial=0.0))
+        )
+        if joints is None or names[j] in joints
+    ]
+    return sorted(found, key=lambda one: one.sampled / one.peak)
+
+
+def what_samples_miss(run: RunLike, joints: Collection[str] | None = None) -> str:
+    """What whoever is given samples must know of them."""
+    if extremes_of(run, "quantity") is None:
+        return "the run holds no extremes, so what its samples miss is not known"
+    found = missed_peaks(run, joints)
+    if not found:
+        return f"the samples show every peak of force and moment to {MISSED:.0%}"
+    more = f"; {len(found) - 1} more peaks are missed" if len(found) > 1 else ""
+    return f"{found[0]}{more}"

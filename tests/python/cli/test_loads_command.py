@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
+from helpers.machines import stopped_rod
 
 MOTION = """[drive.elbow]
 kind = "motion"
@@ -281,18 +282,37 @@ def test_what_is_no_frame_is_named(linkwise, wrist, options, complaint):
     assert complaint in result.err
 
 
+def between_lines(linkwise, store, *options):
+    said = linkwise("loads", str(store), "--at", "child", *options, "--json").json
+    assert said["at"]["extremes"] == "of the samples"
+    return [w["text"] for w in said["warnings"] if "between the samples" in w["text"]]
+
+
 def test_peaks_between_the_samples_are_said_at_other_frames(linkwise, tmp_path):
     """A fall onto a stiff stop: no sample of twelve meets the blow."""
-    builder = lw.ModelBuilder("falling")
-    builder.add_link("base")
-    builder.add_link("rod", mass=1.0, com=(1, 0, 0), inertia=np.eye(3) * 0.01)
-    limits = {"lower": -1.0, "upper": 0.5, "limit_stiffness": 1e6}
-    builder.add_joint("hinge", "revolute", "base", "rod", axis=(0, 1, 0), **limits)
     store = tmp_path / "f.zarr"
-    lw.simulate(builder.build(), duration=1.0, every=0.09, output=store)
-    said = linkwise("loads", str(store), "--at", "rod", "--json").json
-    assert said["at"]["extremes"] == "of the samples"
+    machine = stopped_rod(lower=-1.0, upper=0.5, limit_stiffness=1e6)
+    lw.simulate(machine, duration=1.0, every=0.09, output=store)
     peak = float(lw.loads.peak_loads(lw.open_run(store)).force[0])
-    warned = [w["text"] for w in said["warnings"] if "between the samples" in w["text"]]
-    assert len(warned) == 1
-    assert f"{peak:.4g} N" in warned[0]
+    (said,) = between_lines(linkwise, store)
+    assert f"{peak:.4g} N and" in said
+
+
+def test_only_the_joints_asked_for_are_warned_of(linkwise, tmp_path):
+    """Beside the rod that is stopped hangs one that rests; a plate is fixed to each."""
+    builder = lw.ModelBuilder("two")
+    builder.add_link("ground")
+    for name, com, limits in (
+        ("stopped", (1.0, 0, 0), {"lower": -1.0, "upper": 0.5, "limit_stiffness": 1e6}),
+        ("resting", (0, 0, -1.0), {}),
+    ):
+        builder.add_link(name, mass=1.0, com=com, inertia=0.01 * np.eye(3))
+        builder.add_link(f"{name} plate", mass=0.1, inertia=0.01 * np.eye(3))
+        builder.add_joint(f"{name} hinge", "revolute", "ground", name, axis=(0, 1, 0), **limits)
+        builder.add_joint(f"{name} flange", "fixed", name, f"{name} plate", translation=com)
+    store = tmp_path / "two.zarr"
+    lw.simulate(builder.build(), duration=1.0, every=0.09, output=store)
+    assert between_lines(linkwise, store, "-j", "resting hinge") == []
+    for options in ([], ["-j", "stopped hinge"], ["-j", "stopped flange"]):
+        (said,) = between_lines(linkwise, store, *options)
+        assert "'stopped hinge'" in said

@@ -6,31 +6,11 @@ import xarray as xr
 
 import linkwise as lw
 from helpers.loaded_arm import arm, profile, swing
-from helpers.machines import DOWN_Y, G, pendulum, rod_chain
+from helpers.machines import DOWN_Y, G, pendulum, rod_chain, stopped_arm
 from linkwise.loads.engineering import derived_rows, joint_directions
 from linkwise.loads.extremes import extremes_of
 from linkwise.loads.limits import beyond_limits
 from linkwise.loads.samples import select
-
-
-def stopped_arm(stiffness=1e8):
-    """Two links that fall into a stiff stop."""
-    builder = lw.ModelBuilder("stopped")
-    builder.add_link("base")
-    builder.add_link("upper", mass=4.0, com=(0.2, 0, 0.1), inertia=np.diag([0.1, 0.2, 0.2]))
-    builder.add_link("fore", mass=2.0, com=(0.3, 0.1, 0), inertia=np.diag([0.05, 0.1, 0.1]))
-    builder.add_joint(
-        "shoulder",
-        "revolute",
-        "base",
-        "upper",
-        axis=(0, 1, 0),
-        lower=-0.5,
-        upper=0.5,
-        limit_stiffness=stiffness,
-    )
-    builder.add_joint("elbow", "revolute", "upper", "fore", axis=(0, 1, 0), translation=(0.5, 0, 0))
-    return builder.build()
 
 
 def falling(duration=1.2):
