@@ -14,6 +14,7 @@
 
 #include "gil.hpp"
 #include "linkwise/base/error.hpp"
+#include "linkwise/base/finite.hpp"
 #include "linkwise/base/memory.hpp"
 
 namespace linkwise::bindings {
@@ -171,13 +172,6 @@ class ArrayIn {
   nb::object owner_;
 };
 
-/// Are all of them numbers? Of results too: sums and products of large inputs overflow.
-inline bool is_finite(const double* data, size_t n) {
-  bool finite = true;
-  for (size_t i = 0; i < n; ++i) finite &= data[i] - data[i] == 0;
-  return finite;
-}
-
 /// What an array holds that is no real number, by the kind of its dtype; null for real numbers.
 inline const char* unreal_values(char kind) {
   switch (kind) {
@@ -261,10 +255,11 @@ struct Argument {
     array = as_array(value, name);
     check_shape();
     data = array.data();
-    for (size_t i = 0; i < array.size(); ++i)
-      if (!(data[i] - data[i] == 0))
-        throw InputError(std::string(name) + " holds a NaN or infinite value at flat index " +
-                         std::to_string(i) + "; give finite numbers");
+    if (all_finite({data, array.size()})) return;
+    const double* bad = data;
+    while (*bad - *bad == 0) ++bad;
+    throw InputError(std::string(name) + " holds a NaN or infinite value at flat index " +
+                     std::to_string(bad - data) + "; give finite numbers");
   }
 
   Shape lead() const { return shape_of(array).head(array.ndim() - tail.size()); }

@@ -238,8 +238,8 @@ class PyDynamicsMethod {
     {
       const GilReleased released;
       report = method_->evaluate(t, rows.input(m, 0), du.data, loads.data);
-      if (report.ok() &&
-          !(is_finite(du.data, size(m.nv())) && is_finite(loads.data, size(6 * m.n_joints()))))
+      if (report.ok() && !(all_finite({du.data, size(m.nv())}) &&
+                           all_finite({loads.data, size(6 * m.n_joints())})))
         report.outcome = Outcome::not_finite;
       if (accept && report.ok()) method_->accepted(t);
     }
@@ -276,7 +276,7 @@ nb::dict PyDynamicsMethod::follow(nb::handle times_in, nb::handle q, nb::handle 
       const SweepInput<double> in = rows.input(m, i);
       const Clock::time_point started = Clock::now();
       DynamicsReport report = method_->evaluate(times.data()[i], in, du.data + i * m.nv(), nullptr);
-      if (report.ok() && !is_finite(du.data + i * m.nv(), size(m.nv())))
+      if (report.ok() && !all_finite({du.data + i * m.nv(), size(m.nv())}))
         report.outcome = Outcome::not_finite;
       seconds.push_back(seconds_since(started));
       iterations.push_back(report.iterations);

@@ -21,7 +21,7 @@ struct NumericsError : std::runtime_error {
 
 /// NumericsError unless a result holds numbers alone.
 inline void check_result(const double* data, size_t n) {
-  if (!is_finite(data, n)) refuse_result();
+  if (!all_finite({data, n})) refuse_result();
 }
 
 }  // namespace linkwise::bindings

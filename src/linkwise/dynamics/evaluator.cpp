@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/base/finite.hpp"
 #include "linkwise/constraint/joint_constraint.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/parts.hpp"
@@ -55,27 +56,41 @@ std::vector<double> with_passive(const Model& m, size_t count, const BatchInput&
   return total;
 }
 
-/// Keeps the body furthest outboard of those at which parts failed, whatever their order in time.
-class FailedBody {
+/// How the parts went, whatever their order in time: of the bodies at which some failed, the one
+/// furthest outboard is kept.
+class PartsReport {
  public:
-  void add(int body) {
-    for (int seen = body_; body > seen && !body_.compare_exchange_weak(seen, body);) {
+  void add(int failed_body, bool finite) {
+    for (int seen = body_; failed_body > seen && !body_.compare_exchange_weak(seen, failed_body);) {
     }
+    if (!finite) finite_ = false;
   }
   void write(DynamicsReport& report) const {
-    if (body_ < 0) return;
-    report.outcome = Outcome::not_positive_definite;
     report.body = body_;
+    if (body_ >= 0)
+      report.outcome = Outcome::not_positive_definite;
+    else if (!finite_)
+      report.outcome = Outcome::not_finite;
   }
 
  private:
   std::atomic<int> body_{-1};
+  std::atomic<bool> finite_{true};
 };
+
+/// `rows` rows of results from `first` on; absent ones are finite.
+bool rows_finite(const double* results, size_t first, size_t rows, size_t width) {
+  return !results || all_finite({results + first * width, rows * width});
+}
 
 /// Every state by one method, one after the other.
 void one_by_one(const Model& m, DynamicsMethod& method, size_t count, const BatchInput& s,
                 const ForwardOutput& out, DynamicsReport& report, const GoOn& go_on) {
   const std::vector<double> zero(m.nv());
+  const auto finite = [&](size_t i) {
+    return rows_finite(out.acceleration, i, 1, m.nv()) &&
+           rows_finite(out.joint_load, i, 1, 6 * m.n_joints());
+  };
   for (size_t i = 0; i < count && go_on(); ++i) {
     SweepInput<double> in;
     in.q = s.q + i * m.nq();
@@ -90,6 +105,7 @@ void one_by_one(const Model& m, DynamicsMethod& method, size_t count, const Batc
     report.iterations = std::max(report.iterations, r.iterations);
     report.error_estimate = std::max(report.error_estimate, r.error_estimate);
     report.error_is_bound = r.error_is_bound && (i == 0 || report.error_is_bound);
+    if (report.ok() && r.ok() && !finite(i)) report.outcome = Outcome::not_finite;
     if (!r.ok()) {
       report.outcome = r.outcome;
       if (r.body >= 0) report.body = r.body;
@@ -275,18 +291,20 @@ EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& sta
     one_by_one(m, *picked.method, count, s, out, report, go_on);
     return evaluation_report(m, std::move(choice), report);
   }
-  FailedBody failed;
+  PartsReport parts;
   const auto part = [&](BatchEvaluator& batch, size_t first, size_t n) {
-    failed.add(batch.forward_dynamics(
+    const int failed = batch.forward_dynamics(
         n, s.from(m, first), out.acceleration + first * m.nv(),
-        out.joint_load ? out.joint_load + first * 6 * m.n_joints() : nullptr, picked.on_lanes));
+        out.joint_load ? out.joint_load + first * 6 * m.n_joints() : nullptr, picked.on_lanes);
+    parts.add(failed, rows_finite(out.acceleration, first, n, m.nv()) &&
+                          rows_finite(out.joint_load, first, n, 6 * m.n_joints()));
   };
   for_each_part(m, count, options.executor, go_on, [&](size_t first, size_t n) {
     if (n == count) return part(workspace->batch, first, n);
     Lease own(*this);
     part(own->batch, first, n);
   });
-  failed.write(report);
+  parts.write(report);
   return evaluation_report(m, std::move(choice), report);
 }
 
@@ -311,15 +329,16 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
     s.passive = passive.data();
   }
   const size_t width = causes.size() * 6 * m.n_joints();
-  FailedBody failed;
+  PartsReport parts;
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);
-    failed.add(workspace->batch.loads_by_cause(
+    const int failed = workspace->batch.loads_by_cause(
         n, s.from(m, first), causes, loads + first * width,
-        by_force ? BatchMethod::constraint_force : BatchMethod::articulated_body));
+        by_force ? BatchMethod::constraint_force : BatchMethod::articulated_body);
+    parts.add(failed, rows_finite(loads, first, n, width));
   });
   DynamicsReport report;
-  failed.write(report);
+  parts.write(report);
   return evaluation_report(m, {method, "", ""}, report);
 }
 

@@ -4,18 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <span>
 
+#include "linkwise/base/finite.hpp"
 #include "linkwise/integrate/integrator.hpp"
 
 namespace linkwise {
-
-inline bool all_finite(std::span<const double> values) {
-  // One product decides for all: 0 * x is NaN exactly where x is not finite.
-  double sum = 0.0;
-  for (const double value : values) sum += 0.0 * value;
-  return sum == 0.0;
-}
 
 /// An OdeSystem whose evaluations are counted, checked to be finite, and made on one side of the
 /// times at which the system breaks.

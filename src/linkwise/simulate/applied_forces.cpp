@@ -1,8 +1,8 @@
 #include "linkwise/simulate/applied_forces.hpp"
 
 #include <algorithm>
-#include <cmath>
 
+#include "linkwise/base/finite.hpp"
 #include "linkwise/dynamics/quantities.hpp"
 #include "linkwise/forces/passive.hpp"
 
@@ -42,7 +42,7 @@ void AppliedForces::evaluate(double t, const double* q, const double* v) {
 int AppliedForces::joint_with_bad_force(size_t member) const {
   const Model& m = *setup_.model;
   const auto bad = [](const double* first, int n) {
-    return first && !std::all_of(first, first + n, [](double x) { return std::isfinite(x); });
+    return first && !all_finite({first, static_cast<size_t>(n)});
   };
   for (int j = 0; j < m.n_joints(); ++j) {
     const double* wrench = external(member);

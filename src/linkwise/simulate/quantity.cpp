@@ -1,11 +1,11 @@
 #include "linkwise/simulate/quantity.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <string>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/base/finite.hpp"
 #include "linkwise/dynamics/quantities.hpp"
 
 namespace linkwise {
@@ -142,8 +142,7 @@ std::string_view Sample::not_finite(const Model& model, size_t member) const {
     if (!values[k] || table[k].needs == Needs::works) continue;  // works may be unknown
     const size_t width = quantity_width(table[k], model);
     const double* row = values[k] + member * rows * width;
-    if (!std::all_of(row, row + width, [](double x) { return std::isfinite(x); }))
-      return table[k].name;
+    if (!all_finite({row, width})) return table[k].name;
   }
   return {};
 }
