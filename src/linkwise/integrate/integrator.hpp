@@ -13,9 +13,9 @@ namespace linkwise {
 
 /// The equations of motion as the integrators see them: ydot = f(t, y) with y = [q; v].
 ///
-/// Quaternions in the y given to evaluate() may be slightly off unit length, since the multistep
-/// methods do not project their history: rotations must come from the normalised quaternion and the
-/// rates stay linear in the one given. Its length then has no influence on the motion.
+/// Where y must satisfy constraints, integrators project it after every accepted step. The y given
+/// to evaluate() may be off them by the error of a step: rotations must come from the normalised
+/// quaternion, and the rates stay linear in the one given.
 struct OdeSystem {
   virtual ~OdeSystem() = default;
 
@@ -35,8 +35,11 @@ struct OdeSystem {
   /// Writes qdot for the velocities v, which is not v where a joint has a quaternion.
   virtual void position_rates(const double* q, const double* v, double* qdot) = 0;
 
-  /// Projects y onto its constraints: quaternions back to unit length.
-  virtual void normalise(double* y) = 0;
+  /// Whether project() may change anything; the same for the system's whole life.
+  virtual bool constrained() const { return false; }
+  /// Moves y, which is off its constraints by no more than the error of a step, onto them: first
+  /// the positions, then the velocities. After an outcome other than `converged`, y is what it was.
+  virtual Outcome project(double /*t*/, double* /*y*/) { return Outcome::converged; }
 
   /// Writes what the relative tolerance is taken of, per component: not negative.
   virtual void error_scale(const double* y, double* scale) const {
@@ -49,7 +52,7 @@ struct OdeSystem {
   /// Whether f(t, y) or a low derivative of it jumps at time t, so that methods begin anew there.
   virtual bool breaks_at(double /*t*/) { return false; }
 
-  /// Called after each accepted step, with y normalised.
+  /// Called after each accepted step, with y projected.
   virtual void accepted(double /*t*/, const double* /*y*/) {}
 };
 
@@ -90,7 +93,7 @@ class Integrator {
   /// and only start() may follow.
   virtual Outcome step(double t_limit) = 0;
 
-  /// Writes y(t), normalised, for t within the last step (or at the start, before the first one).
+  /// Writes y(t), projected, for t within the last step (or at the start, before the first one).
   virtual void interpolate(double t, std::span<double> y) = 0;
 
   virtual double time() const = 0;

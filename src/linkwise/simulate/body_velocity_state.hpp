@@ -22,7 +22,11 @@ class BodyVelocityState final : public IntegratedState {
   Outcome evaluate(double t, const double* y, double* ydot) override;
   Outcome evaluate_aside(double t, const double* y, double* ydot) override;
   void position_rates(const double* q, const double* w, double* qdot) override;
-  void normalise(double* y) override { normalise_quaternions(model_, y); }
+  bool constrained() const override { return model_.nq() != model_.nv(); }
+  Outcome project(double /*t*/, double* y) override {
+    normalise_quaternions(model_, y);
+    return Outcome::converged;
+  }
   void accepted(double t, const double* y) override;
   double step_limit(double t) override { return host_.step_limits->after(t); }
   bool breaks_at(double t) override { return host_.step_limits->breaks_at(t); }

@@ -274,8 +274,9 @@ void Simulation::calc_position_rates(const double* q, const double* v, double* q
       element_position_rate(e, q + i * nq(), v + i * nv(), qdot + i * nq());
 }
 
-void Simulation::normalise(double* y) {
+Outcome Simulation::project(double /*t*/, double* y) {
   for (size_t i = 0; i < members_; ++i) normalise_quaternions(model(), y + i * nq());
+  return Outcome::converged;
 }
 
 void Simulation::accepted(double t, const double* y) {

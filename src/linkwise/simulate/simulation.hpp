@@ -98,7 +98,8 @@ class Simulation : private OdeSystem {
   Outcome evaluate(double t, const double* y, double* ydot) override;
   Outcome evaluate_aside(double t, const double* y, double* ydot) override;
   void position_rates(const double* q, const double* v, double* qdot) override;
-  void normalise(double* y) override;
+  bool constrained() const override { return model().nq() != model().nv(); }
+  Outcome project(double t, double* y) override;
   void accepted(double t, const double* y) override;
   void error_scale(const double* y, double* scale) const override;
   double step_limit(double t) override { return step_limits_->after(t); }

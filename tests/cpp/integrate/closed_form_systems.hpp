@@ -20,7 +20,6 @@ struct ForcedOscillator : OdeSystem {
     return Outcome::converged;
   }
   void position_rates(const double*, const double* v, double* qdot) override { qdot[0] = v[0]; }
-  void normalise(double*) override {}
 
   static std::array<double, 2> initial() { return {0.0, 0.0}; }
   static std::array<double, 2> solution(double t) {
@@ -42,7 +41,6 @@ struct FirstOrder : OdeSystem {
     return rate(t, y, ydot) ? Outcome::converged : Outcome::not_positive_definite;
   }
   void position_rates(const double*, const double*, double*) override {}
-  void normalise(double*) override {}
   void accepted(double t, const double*) override { accepted_times.push_back(t); }
 
   int n_;
@@ -67,14 +65,65 @@ struct SpinningBody : OdeSystem {
     qdot[2] = 0.5 * (s * w[2] + x * w[1] - y * w[0]);
     qdot[3] = -0.5 * (x * w[0] + y * w[1] + z * w[2]);
   }
-  void normalise(double* y) override {
+  bool constrained() const override { return true; }
+  Outcome project(double, double* y) override {
     const double length = std::hypot(std::hypot(y[0], y[1]), std::hypot(y[2], y[3]));
     for (int i = 0; i < 4; ++i) y[i] /= length;
+    return Outcome::converged;
   }
   static std::vector<double> initial(double rate) { return {0, 0, 0, 1, 0, 0, rate}; }
   static double norm(const std::vector<double>& y) {
     return std::hypot(std::hypot(y[0], y[1]), std::hypot(y[2], y[3]));
   }
+};
+
+/// A pendulum of length 1 in Cartesian coordinates, let go horizontally: y = (x, z, x', z'), with
+/// the accelerations that keep r.r = 1, which the integration leaves unless y is projected.
+struct CartesianPendulum : OdeSystem {
+  explicit CartesianPendulum(bool projects) : projects_(projects) {}
+  int size() const override { return 4; }
+  int position_size() const override { return 2; }
+  Outcome evaluate(double, const double* y, double* ydot) override {
+    const double x = y[0], z = y[1], vx = y[2], vz = y[3];
+    const double pull = (vx * vx + vz * vz - gravity * z) / (x * x + z * z);
+    ydot[0] = vx;
+    ydot[1] = vz;
+    ydot[2] = -pull * x;
+    ydot[3] = -pull * z - gravity;
+    return Outcome::converged;
+  }
+  void position_rates(const double*, const double* v, double* qdot) override {
+    qdot[0] = v[0];
+    qdot[1] = v[1];
+  }
+  bool constrained() const override { return projects_; }
+  Outcome project(double, double* y) override {
+    if (!projects_) return Outcome::converged;
+    const double length = std::hypot(y[0], y[1]);
+    y[0] /= length;
+    y[1] /= length;
+    const double stretch = y[0] * y[2] + y[1] * y[3];
+    y[2] -= stretch * y[0];
+    y[3] -= stretch * y[1];
+    return Outcome::converged;
+  }
+
+  static constexpr double gravity = 9.81;
+  static std::vector<double> initial() { return {1, 0, 0, 0}; }
+  /// How far y is off its constraints.
+  static double drift(const std::vector<double>& y) {
+    return std::max(std::abs(std::hypot(y[0], y[1]) - 1), std::abs(y[0] * y[2] + y[1] * y[3]));
+  }
+  static double energy(const std::vector<double>& y) {
+    return 0.5 * (y[2] * y[2] + y[3] * y[3]) + gravity * y[1];
+  }
+  /// At t = 10 s, from sin(angle / 2) = k sn(K - sqrt(gravity) t, k) with k^2 = 1/2.
+  static double error_at_10(const std::vector<double>& y) {
+    return std::hypot(y[0] - 0.275087462576117, y[1] + 0.961419205099125);
+  }
+
+ private:
+  bool projects_;
 };
 
 /// Steps to t_end and returns y there; how the last step ended is in outcome.

@@ -185,26 +185,6 @@ TEST(Cvode, GoesOnAfterEvaluationsThatFailOnlyForLargeSteps) {
   EXPECT_NEAR(integrate_to(*integrator, 1.9, 1)[0], std::pow(1.0 - 0.5 * 1.9, 2), 1e-6);
 }
 
-TEST(Cvode, PutsQuaternionsBackThatDriftFar) {
-  // A false term stretches the quaternion at rate 1: the history must be restarted, not lost.
-  struct Stretching : SpinningBody {
-    Outcome evaluate(double t, const double* y, double* ydot) override {
-      SpinningBody::evaluate(t, y, ydot);
-      for (int i = 0; i < 4; ++i) ydot[i] += y[i];
-      longest = std::max(longest, std::hypot(y[2], y[3]));
-      return Outcome::converged;
-    }
-    double longest = 0.0;
-  } system;
-  const auto integrator = make("adams", system, 1e-9);
-  integrator->start(0.0, SpinningBody::initial(3.0));
-  const std::vector<double> y = integrate_to(*integrator, 1.0, 7);
-  EXPECT_LT(system.longest, 1.5);
-  EXPECT_NEAR(y[2], std::sin(1.5), 1e-5);
-  EXPECT_NEAR(y[3], std::cos(1.5), 1e-5);
-  EXPECT_GT(integrator->statistics().steps, 20);
-}
-
 TEST(CvodeThreads, RunsIndependentIntegratorsAtOnce) {
   std::vector<double> errors(4, 1.0);
   {

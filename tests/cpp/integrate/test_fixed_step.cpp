@@ -1,4 +1,5 @@
 #include <cmath>
+#include <string_view>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -87,6 +88,27 @@ TEST(SemiImplicitEuler, ConservesTheModifiedEnergyOfAnOscillator) {
     ASSERT_EQ(integrator->step(1e9), Outcome::converged);
     integrator->interpolate(integrator->time(), y);
     ASSERT_NEAR(y[0] * y[0] + y[1] * y[1] - h * y[0] * y[1], 1.0, 1e-12);
+  }
+}
+
+TEST(FixedStep, StaysOnConstraints) {
+  for (const std::string_view kind : {"runge_kutta_4", "semi_implicit_euler"}) {
+    std::vector<double> y(4);
+    double drift[2] = {};
+    for (const bool projects : {false, true}) {
+      CartesianPendulum system(projects);
+      const auto integrator = make(kind, system, 0.01);
+      integrator->start(0.0, CartesianPendulum::initial());
+      for (int k = 1; k <= 1000; ++k) {
+        ASSERT_EQ(integrator->step(1e9), Outcome::converged);
+        for (const double t : {0.01 * k, 0.01 * k - 0.005}) {
+          integrator->interpolate(t, y);
+          drift[projects] = std::max(drift[projects], CartesianPendulum::drift(y));
+        }
+      }
+    }
+    EXPECT_LT(drift[1], 1e-14) << kind;
+    EXPECT_GT(drift[0], 1e-6) << kind;
   }
 }
 

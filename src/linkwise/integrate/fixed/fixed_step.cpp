@@ -20,7 +20,7 @@ void FixedStep::start(double t0, std::span<const double> y0) {
   on_grid_ = true;
   system_.evaluations = 0;
   y_.assign(y0.begin(), y0.end());
-  system_->normalise(y_.data());
+  system_->project(t0, y_.data());
   previous_ = y_;
   next_ = y_;
   prepare();
@@ -60,7 +60,7 @@ void FixedStep::interpolate(double t, std::span<double> y) {
   const double s = 1.0 + (t - time_) / last_step_;
   LINKWISE_ASSERT(s > -1e-6 && s < 1.0 + 1e-6, "t lies within the last step");
   interpolate_fraction(s, y);
-  system_->normalise(y.data());
+  system_->project(t, y.data());
 }
 
 IntegratorStatistics FixedStep::statistics() const {

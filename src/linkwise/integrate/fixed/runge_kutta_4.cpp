@@ -48,8 +48,9 @@ class RungeKutta4 final : public FixedStep {
       next()[i] = y()[i] + h / 6.0 * (k1[i] + 2.0 * (k2_[i] + k3_[i]) + k4_[i]);
     }
     if (!all_finite(next())) return Outcome::not_finite;
-    system_->normalise(next().data());
-    const Outcome outcome = system_.evaluate(t + h, next().data(), stage_.data());
+    Outcome outcome = system_->project(t + h, next().data());
+    if (outcome != Outcome::converged) return outcome;
+    outcome = system_.evaluate(t + h, next().data(), stage_.data());
     if (outcome != Outcome::converged) return outcome;
     start_rate_.swap(end_rate_);
     end_rate_.swap(stage_);

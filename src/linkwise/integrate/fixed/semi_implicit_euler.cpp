@@ -29,8 +29,7 @@ class SemiImplicitEuler final : public FixedStep {
     system_->position_rates(y().data(), next().data() + nq, rate_.data());
     for (std::size_t i = 0; i < nq; ++i) next()[i] = y()[i] + h * rate_[i];
     if (!all_finite(next())) return Outcome::not_finite;
-    system_->normalise(next().data());
-    return Outcome::converged;
+    return system_->project(t + h, next().data());
   }
 
   void interpolate_fraction(double s, std::span<double> result) override {

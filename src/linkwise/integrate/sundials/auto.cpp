@@ -59,7 +59,8 @@ class Past final : public OdeSystem {
   void position_rates(const double* q, const double* v, double* qdot) override {
     system_.position_rates(q, v, qdot);
   }
-  void normalise(double* y) override { system_.normalise(y); }
+  bool constrained() const override { return system_.constrained(); }
+  Outcome project(double t, double* y) override { return system_.project(t, y); }
   void error_scale(const double* y, double* scale) const override { system_.error_scale(y, scale); }
   double step_limit(double t) override { return std::min(system_.step_limit(t), end_); }
   bool breaks_at(double t) override { return system_.breaks_at(t); }

@@ -27,11 +27,6 @@ using namespace sundials;
 
 constexpr int krylov_dimension = 30;
 
-/// Quaternions that drifted this far from unit length are put back by a restart of the method,
-/// because its history cannot be projected. The motion does not feel the drift (see OdeSystem), but
-/// the error weights would.
-constexpr double largest_drift = 1e-3;
-
 /// Steps whose error is to stay below this share of a value fail for rounding alone.
 constexpr double rounding = 64 * std::numeric_limits<double>::epsilon();
 
@@ -51,11 +46,15 @@ class Cvode final : public Integrator {
  private:
   void attach_solvers(int method);
   void restart();
+  Outcome take_state(double t);
   void read_counters();
   Outcome classify(int flag) const;
   Outcome no_smaller_step() const;
   static int right_hand_side(sunrealtype t, N_Vector y, N_Vector ydot, void* self);
   static int error_weights(N_Vector y, N_Vector weight, void* self);
+  static int projection(sunrealtype t, N_Vector y, N_Vector correction, sunrealtype tolerance,
+                        N_Vector error, void* self);
+  Outcome project(double t, const double* y);
 
   double* data(const Vector& vector) const { return N_VGetArrayPointer(vector.get()); }
   std::size_t size() const { return system_.size(); }
@@ -71,7 +70,9 @@ class Cvode final : public Integrator {
   NonlinearSolverHandle nonlinear_solver_;
   Memory memory_;
 
-  std::vector<double> state_;  ///< normalised, at time_
+  std::vector<double> state_;  ///< projected, at time_
+  bool write_back_ = false;    ///< state_ into CVODE's history, before its next step
+  std::vector<double> projected_;
   double time_ = 0.0;
   bool interpolant_valid_ = false;
   bool restart_needed_ = false;
@@ -101,6 +102,12 @@ Cvode::Cvode(int method, OdeSystem& system, const IntegratorOptions& options)
   if (options.max_order > 0) check(CVodeSetMaxOrd(memory, options.max_order), "CVodeSetMaxOrd");
   if (options.max_step > 0.0) check(CVodeSetMaxStep(memory, options.max_step), "CVodeSetMaxStep");
   attach_solvers(method);
+  if (method == CV_BDF && system.constrained()) {
+    check(CVodeSetProjFn(memory, projection), "CVodeSetProjFn");
+    // The error test sees the whole error. Its part along the constraints vanishes to leading order
+    // where a motion turns at constant rate, and orders would be chosen by what is left.
+    check(CVodeSetProjErrEst(memory, SUNFALSE), "CVodeSetProjErrEst");
+  }
 }
 
 void Cvode::attach_solvers(int method) {
@@ -140,11 +147,41 @@ int Cvode::right_hand_side(sunrealtype t, N_Vector y, N_Vector ydot, void* self)
   }
 }
 
-/// 1 / (rtol scale + atol).
+/// The projection of bdf, whose history holds earlier y: CVODE corrects it with y.
+int Cvode::projection(sunrealtype t, N_Vector y, N_Vector correction, sunrealtype /*tolerance*/,
+                      N_Vector /*error*/, void* self) {
+  Cvode& cvode = *static_cast<Cvode*>(self);
+  try {
+    const double* unprojected = N_VGetArrayPointer(y);
+    const Outcome outcome = cvode.project(t, unprojected);
+    if (outcome == Outcome::converged) {
+      double* c = N_VGetArrayPointer(correction);
+      for (std::size_t i = 0; i < cvode.size(); ++i) c[i] = cvode.projected_[i] - unprojected[i];
+      return 0;
+    }
+    cvode.failure_ = outcome;
+    cvode.steps_since_failure_ = 0;
+    return 1;  // positive: CVODE tries again with a smaller step
+  } catch (...) {
+    cvode.exception_ = std::current_exception();
+    return -1;
+  }
+}
+
+/// y at time t into projected_.
+Outcome Cvode::project(double t, const double* y) {
+  projected_.assign(y, y + size());
+  return system_->project(t, projected_.data());
+}
+
+/// 1 / (rtol scale + atol). CVODE asks for it at the begin of every step with its own y, the
+/// first column of its history, in its hands. For Adams the other columns hold rates alone, so
+/// this is where the step is made to start from the projected state.
 int Cvode::error_weights(N_Vector y, N_Vector weight, void* self) {
-  const Cvode& cvode = *static_cast<Cvode*>(self);
+  Cvode& cvode = *static_cast<Cvode*>(self);
   const IntegratorOptions& o = cvode.options_;
-  const double* value = N_VGetArrayPointer(y);
+  double* value = N_VGetArrayPointer(y);
+  if (std::exchange(cvode.write_back_, false)) std::ranges::copy(cvode.state_, value);
   double* own = N_VGetArrayPointer(weight);
   N_VConst(0.0, weight);
   cvode.system_->error_scale(value, own);
@@ -160,7 +197,7 @@ int Cvode::error_weights(N_Vector y, N_Vector weight, void* self) {
 void Cvode::start(double t0, std::span<const double> y0) {
   LINKWISE_ASSERT(y0.size() == size(), "y0 has the length of the system");
   state_.assign(y0.begin(), y0.end());
-  system_->normalise(state_.data());
+  system_->project(t0, state_.data());
   time_ = t0;
   system_.evaluations = 0;
   counters_ = earlier_ = {};
@@ -180,6 +217,7 @@ void Cvode::restart() {
   counters_ = {};
   interpolant_valid_ = false;
   restart_needed_ = false;
+  write_back_ = false;
 }
 
 Outcome Cvode::step(double /*t_limit*/) {
@@ -189,8 +227,8 @@ Outcome Cvode::step(double /*t_limit*/) {
   if (restart_needed_) restart();
   const double limit = system_.begin_step(time_);
   check(CVodeSetStopTime(memory_.get(), std::min(limit, never)), "CVodeSetStopTime");
-  // CVODE bounds its very first step by a tenth of the distance to this time and ignores it later.
-  // It is not t_limit, or the first step would depend on the output times.
+  // CVODE bounds its very first step by a tenth of the distance to this time and ignores it
+  // later. It is not t_limit, or the first step would depend on the output times.
   const double reach = options_.max_step > 0.0 ? 10.0 * options_.max_step : 1.0;
   const double horizon = std::min(time_ + reach, limit);
   sunrealtype t = time_;
@@ -203,17 +241,27 @@ Outcome Cvode::step(double /*t_limit*/) {
   if (!(t > time_ + 4.0 * std::numeric_limits<double>::epsilon() * std::abs(time_))) {
     return no_smaller_step();
   }
+  if (const Outcome outcome = take_state(t); outcome != Outcome::converged) return outcome;
   time_ = t;
   ++steps_since_failure_;
   restart_needed_ = t == limit && system_->breaks_at(t);
-  std::copy_n(data(y_), size(), state_.begin());
-  system_->normalise(state_.data());
-  for (std::size_t i = 0; i < size(); ++i) {
-    restart_needed_ |= std::abs(state_[i] - data(y_)[i]) > largest_drift;
-  }
   interpolant_valid_ = true;
   read_counters();
   system_->accepted(time_, state_.data());
+  return Outcome::converged;
+}
+
+/// What CVODE returned at time t, projected, into state_, unless it cannot be projected.
+Outcome Cvode::take_state(double t) {
+  const double* y = data(y_);
+  if (!system_->constrained()) {
+    std::copy_n(y, size(), state_.begin());
+    return Outcome::converged;
+  }
+  const Outcome outcome = project(t, y);
+  if (outcome != Outcome::converged) return outcome;
+  state_.swap(projected_);
+  write_back_ = method_ == CV_ADAMS;
   return Outcome::converged;
 }
 
@@ -228,6 +276,8 @@ Outcome Cvode::classify(int flag) const {
     case CV_CONV_FAILURE:
     case CV_LSETUP_FAIL:
     case CV_LSOLVE_FAIL:
+    case CV_PROJFUNC_FAIL:
+    case CV_REPTD_PROJFUNC_ERR:
     case CV_ILL_INPUT:  // of a step: times too close together to choose one
     case CV_TOO_CLOSE:
       return no_smaller_step();
@@ -270,7 +320,7 @@ void Cvode::interpolate(double t, std::span<double> y) {
   }
   check(CVodeGetDky(memory_.get(), t, 0, scratch_.get()), "CVodeGetDky");
   std::copy_n(data(scratch_), y.size(), y.begin());
-  system_->normalise(y.data());
+  system_->project(t, y.data());
 }
 
 IntegratorStatistics Cvode::statistics() const {
