@@ -54,7 +54,7 @@ Pendulum swing(std::string_view kind, double tolerance, bool projects) {
   integrator->start(0.0, CartesianPendulum::initial());
   Pendulum result;
   std::vector<double> y(4);
-  const auto look = [&](double t) {
+  const auto measure = [&](double t) {
     integrator->interpolate(t, y);
     result.drift = std::max(result.drift, CartesianPendulum::drift(y));
     result.energy = std::max(result.energy, std::abs(CartesianPendulum::energy(y)));
@@ -63,8 +63,8 @@ Pendulum swing(std::string_view kind, double tolerance, bool projects) {
     const double before = integrator->time();
     EXPECT_EQ(integrator->step(10.0), Outcome::converged);
     if (integrator->time() >= 10.0) break;
-    look(integrator->time());
-    look(0.5 * (before + integrator->time()));
+    measure(integrator->time());
+    measure(0.5 * (before + integrator->time()));
   }
   integrator->interpolate(10.0, y);
   result.error = CartesianPendulum::error_at_10(y);
