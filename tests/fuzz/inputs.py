@@ -75,8 +75,9 @@ def stored_run(rng, folder):
     """A damaged folder of a stored run is opened and evaluated."""
     place = folder / "run.zarr"
     shutil.rmtree(place, ignore_errors=True)
+    for folder in sorted({str(Path(name).parent) for name in _stored_files()}):
+        (place / folder).mkdir(parents=True, exist_ok=True)
     for name, data in _stored_files().items():
-        (place / name).parent.mkdir(parents=True, exist_ok=True)
         (place / name).write_bytes(data)
     for _ in range(rng.choice((1, 1, 2, 4))):
         _damage_folder(rng, place)
@@ -158,10 +159,10 @@ def _stored_files():
 
 
 def _damage_folder(rng, place):
-    files = sorted(p for p in place.rglob("*") if p.is_file() and not p.is_symlink())
-    if not files:
-        return
-    file, other = rng.choice(files), rng.choice(files)
+    names = sorted(_stored_files())
+    file, other = place / rng.choice(names), place / rng.choice(names)
+    if any(p.is_symlink() or not p.is_file() for p in (file, other)):
+        return  # damaged before
     how = rng.randrange(9)
     if how < 3:
         file.write_bytes(damage_bytes(rng, file.read_bytes()))

@@ -6,6 +6,7 @@ import pytest
 
 import linkwise as lw
 
+from . import __main__ as runner
 from . import calls, inputs
 from .judge import judge
 
@@ -65,3 +66,26 @@ def test_damage_is_found():
     assert "ZeroDivisionError" in judge(lambda: 1 / 0)
     assert "not finite" in judge(lambda: inputs.must_be_finite(float("nan"), "x"))
     assert "does not name" in judge(lambda: lw.load("none.urdf"), "other.urdf")
+
+
+def test_crashes_hangs_and_findings_are_told_apart(monkeypatch):
+    """Of ten inputs one ends its process, one never ends, one fails; the others are run, too."""
+
+    def make(kind, number, folder):
+        actions = {3: lambda: os._exit(5), 5: lambda: _forever(), 7: lambda: 1 / 0}
+        return None, actions.get(number, lambda: None)
+
+    monkeypatch.setattr(runner.made, "make", make)
+    monkeypatch.setattr(runner, "FUSE", 0.5)
+    done, findings = runner.run(["table"], range(10), jobs=2)
+    assert done == {"table": 10}
+    assert sorted(number for _, number, _ in findings) == [3, 5, 7]
+    texts = {number: text for _, number, text in findings}
+    assert texts[3] == "ended by 5"
+    assert texts[5].startswith("takes longer than 0.5 s")
+    assert texts[7].startswith("ZeroDivisionError")
+
+
+def _forever():
+    while True:
+        pass
