@@ -239,6 +239,9 @@ void bind_simulation(nb::module_& m) {
   m.def("numerics", &numerics_list,
         "The options of Simulation, as dictionaries of name, default, units, kind (number, count, "
         "name) and description.");
+  m.def(
+      "peak_state_size", [](const PyModel& model) { return Extremes::state_size(*model.model); },
+      "model"_a, "Numbers of each state that extremes hold of a peak; none of large machines.");
   m.def("quantities", &quantity_list, "The table of recorded quantities, as dictionaries.");
 }
 

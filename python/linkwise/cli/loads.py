@@ -93,7 +93,7 @@ def loads(
             )
         joint_position(opened, name)
     found = collect(opened, machine, rating_tables(opened, ratings), certify, as_json)
-    shares = peak_shares(opened, machine, found["summary"], split) if split else []
+    shares = peak_shares(opened, machine, split) if split else []
     records = peak_records(found, joint)
     if csv is not None:
         write_csv(records, csv)
@@ -218,36 +218,28 @@ def peak_records(found: dict[str, Any], joints: list[str] | None) -> list[dict[s
     return records
 
 
-def peak_shares(run: Run, model: Model, summary: xr.Dataset, by: str) -> list[dict[str, Any]]:
+def peak_shares(run: Run, model: Model, by: str) -> list[dict[str, Any]]:
     """What each cause adds to the peak force and moment, along them; the shares add up."""
-    import numpy as np
-
     from linkwise._core import InputError
-    from linkwise.loads.causes import CAUSES, Split, along_total
+    from linkwise.base import HALVES
+    from linkwise.loads.causes import CAUSES, split_at_peaks
 
     if by not in CAUSES:
         raise InputError(f"--split: {by!r} is unknown; use force or motion")
-    made = Split(run, by, model)  # type: ignore[arg-type]
-    times = run.dataset["time"].values
-    names = [str(name) for name in summary["joint"].values]
-    records = []
-    for half, quantity, unit in ((0, "force", "N"), (3, "moment", "N m")):
-        when = summary["peak_time"].sel(quantity=quantity).values
-        for j, name in enumerate(names):
-            k = int(np.searchsorted(times, when[j]))
-            shares = made.shares(slice(k, k + 1))[:, :, j, half : half + 3]
-            parts, size = along_total(shares)
-            records.append(
-                {
-                    "joint": name,
-                    "quantity": quantity,
-                    "unit": unit,
-                    "time": float(times[k]),
-                    "peak": float(size[0]),
-                    **dict(zip(made.names, parts[0].tolist(), strict=True)),
-                }
-            )
-    return records
+    found = split_at_peaks(run, by, model)  # type: ignore[arg-type]
+    columns = {name: found[name].values for name in ("time", "total", "peak")}
+    columns |= {str(name): found["share"].sel(cause=name).values for name in found["cause"].values}
+    return [
+        {
+            "joint": name,
+            "quantity": quantity,
+            "unit": unit,
+            "at_peak": bool(found["at_peak"].values[k, j]),
+            **{key: float(values[k, j]) for key, values in columns.items()},
+        }
+        for k, (quantity, unit, _) in enumerate(HALVES)
+        for j, name in enumerate(found["joint"].values.tolist())
+    ]
 
 
 def _with_bound(record: dict[str, Any]) -> str:
@@ -332,14 +324,19 @@ def _margin_table(rated: list[dict[str, Any]]) -> Any:
 
 
 def _share_table(shares: list[dict[str, Any]]) -> Any:
-    fixed = ("joint", "quantity", "unit", "time", "peak")
+    fixed = ("joint", "quantity", "unit", "at_peak", "time", "total", "peak")
     causes = [key for key in shares[0] if key not in fixed]
+    beside = not all(record["at_peak"] for record in shares)
+    where = "the peak" if not beside else "the peak, of loads marked * at the sample beside it"
     headings = [("joint", "left"), ("of the peak", "left"), ("at [s]", "right"), ("load", "right")]
+    headings += [("peak", "right")] if beside else []
     result = table(
-        "By cause, at the sample after the peak, along the load there; the shares add up to it",
+        f"By cause, at {where}, along the load there; the shares add up to it",
         [*headings, *((name, "right") for name in causes)],
     )
     for record in shares:
-        cells = [number(record[name]) for name in ("time", "peak", *causes)]
+        keys = ("time", "total", *(("peak",) if beside else ()), *causes)
+        cells = [number(record[name]) for name in keys]
+        cells[1] += "" if record["at_peak"] else " *"
         result.add_row(text(record["joint"]), f"{record['quantity']} [{record['unit']}]", *cells)
     return result

@@ -4,7 +4,7 @@ Everything takes a `Run` and returns xarray objects whose attributes state units
 The run must hold `joint_load`; what else a function needs is in its docstring.
 """
 
-from linkwise.loads.causes import split
+from linkwise.loads.causes import split, split_at_peaks
 from linkwise.loads.certainty import bounds
 from linkwise.loads.energy import energy_balance
 from linkwise.loads.engineering import QUANTITIES, quantities
@@ -28,5 +28,6 @@ __all__ = [
     "quantities",
     "spectrum",
     "split",
+    "split_at_peaks",
     "summary",
 ]

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from linkwise import _core
-from linkwise.base import Array, lengths
+from linkwise.base import HALVES, Array, lengths
 from linkwise.io.complaint import check_one_of
+from linkwise.loads.extremes import (
+    MISSED,
+    load_at_extremes,
+    quantity_rows,
+    states_at_peaks,
+    what_samples_miss,
+)
+from linkwise.loads.peaks import peak_loads
 from linkwise.loads.samples import (
     drive_kinds,
     external,
@@ -95,30 +103,67 @@ class Split:
         """(time, cause, joint, 6) of these samples."""
         q = rows(self.run, "position", where)
         v = rows(self.run, "velocity", where)
-        outside = external(self.run, self.model, where)
-        if self.by == "force":
-            return self._by_force(q, v, outside, where)
-        return self._by_motion(q, v, outside, where)
+        a = None
+        if self.by == "motion" or "motion" in self.names:
+            a = rows(self.run, "acceleration", where)
+        torque = rows(self.run, "drive_torque", where) if self.by == "force" else None
+        return self._of(q, v, a, torque, external(self.run, self.model, where))
 
-    def _by_force(
-        self, q: Array, v: Array, outside: Array | None, where: slice | Sequence[int]
-    ) -> Array:
-        torque = np.where(self.imposed, 0.0, rows(self.run, "drive_torque", where))
-        held = rows(self.run, "acceleration", where) if "motion" in self.names else None
-        return _core.joint_loads_by_cause(
-            self.free, self.names, q, v, torque, external=outside, prescribed=held
+    def shares_at_peaks(self, when: Array) -> Array:
+        """(half, joint, cause, 6) of each joint at when (half, joint) its force and its moment were
+        largest; NaN where that moment cannot be made again.
+
+        The run holds the state. Wrenches from outside are interpolated between samples, and count
+        only if the shares add up to the load that the run holds of that moment.
+        """
+        shares = np.full((*when.shape, len(self.names), 6), np.nan)
+        states = states_at_peaks(self.run, self.model)
+        if states is None:
+            return shares
+        there = ~np.isnan(states.q).any(axis=-1)
+        half, joint = np.nonzero(there)
+        outside = self._external_at(when[there])
+        evaluated = self._of(*(part[there] for part in states), outside)
+        own = evaluated[np.arange(joint.size), :, joint]
+        known = load_at_extremes(self.run)[quantity_rows([HALVES[h][0] for h in half]), joint]
+        off, size = (
+            lengths(load.reshape(-1, 2, 3))[np.arange(joint.size), half]
+            for load in (own.sum(axis=1) - known, known)
         )
+        own[off > MISSED * size] = np.nan
+        shares[there] = own
+        return shares
 
-    def _by_motion(
-        self, q: Array, v: Array, outside: Array | None, where: slice | Sequence[int]
+    def _external_at(self, when: Array) -> Array | None:
+        """The wrenches from outside, (time, body, 6), interpolated between samples."""
+        times = self.run.dataset["time"].values
+        after = np.searchsorted(times, when).clip(max=times.size - 1)
+        before = np.maximum(after - 1, 0)
+        every = external(self.run, self.model, slice(None))
+        if every is None:
+            return None
+        span = np.where(after > before, times[after] - times[before], 1.0)
+        share = ((when - times[before]) / span).clip(0, 1)[:, None, None]
+        between: Array = (1 - share) * every[before] + share * every[after]
+        return between
+
+    def _of(
+        self, q: Array, v: Array, a: Array | None, torque: Array | None, outside: Array | None
     ) -> Array:
+        if self.by == "force":
+            assert torque is not None
+            driven = np.where(self.imposed, 0.0, torque)
+            held = a if "motion" in self.names else None
+            return _core.joint_loads_by_cause(
+                self.free, self.names, q, v, driven, external=outside, prescribed=held
+            )
         shares = np.empty((len(q), len(self.names), self.model.n_joints, 6))
         for k, cause in enumerate(self.names):
             shares[:, k] = _core.inverse_dynamics_loads(
                 self.model,
                 q,
                 v if cause == "velocity" else None,
-                rows(self.run, "acceleration", where) if cause == "acceleration" else None,
+                a if cause == "acceleration" else None,
                 external=outside if cause == "external" else None,
                 gravity=1.0 if cause == "gravity" else 0.0,
             )
@@ -139,7 +184,8 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
 
     Returns:
         DataArray (time, cause, joint, component), frame and signs as `joint_load`. Causes that the
-        run cannot have are left out.
+        run cannot have are left out. At the samples: the attribute `samples` says what these miss,
+        and `split_at_peaks` is what the peaks are made of.
     """
     import xarray as xr
 
@@ -155,9 +201,90 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
             "joint": ("joint", joint_names(run)),
             "component": given["component"],
         },
-        attrs={**given.attrs, "long_name": f"joint load by {by}", **about},
+        attrs={
+            **given.attrs,
+            "long_name": f"joint load by {by}",
+            **about,
+            "samples": what_samples_miss(run),
+        },
         name="joint_load",
     )
+
+
+def split_at_peaks(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Dataset:
+    """What each cause adds to the largest force and the largest moment of every joint.
+
+    Args:
+        run, by, model: As for `split`.
+
+    Returns:
+        Dataset over (quantity, joint): `share` (cause, quantity, joint), its part along the load at
+        `time` [s], whose size `total` the shares add up to; `peak`, that of `peak_loads`, which
+        `total` is too, to 1 % where wrenches act from outside, which are interpolated;
+        `at_peak`: 1 where the load is taken at the peak, 0 where it is that of the sample beside it
+        with the larger load. That is so where the run does not hold the machine's state at the
+        peak: of machines with more than 50 joints, without extremes, or where wrenches from outside
+        change too fast for the samples.
+    """
+    import xarray as xr
+
+    made = Split(run, by, model)
+    peaks = peak_loads(run)
+    times = run.dataset["time"].values
+    names, shape = joint_names(run), (len(HALVES), len(joint_names(run)))
+    when = np.stack([peaks[f"{name}_time"].values for name, _, _ in HALVES])
+    own = np.where(np.isin(when, times)[..., None, None], np.nan, made.shares_at_peaks(when))
+    at_peak = np.isin(when, times) | ~np.isnan(own).any(axis=(2, 3))
+    total, share = np.zeros(shape), np.zeros((len(made.names), *shape))
+    samples = _Last(made)
+    for half, j in np.ndindex(shape):
+        shares = own[half, j]
+        if np.isnan(shares).any():
+            k = _larger_beside(run, times, float(when[half, j]), half, j)
+            when[half, j], shares = times[k], samples.at(k)[:, j]
+        parts, size = along_total(shares[None, :, 3 * half : 3 * half + 3])
+        total[half, j], share[:, half, j] = size[0], parts[0]
+    dims = ("quantity", "joint")
+    of = {"units": "of the quantity: N, N m"}
+    about = {
+        "time": {"long_name": "when", "units": "s"},
+        "total": {"long_name": "size of the load then, the sum of the shares", **of},
+        "peak": {"long_name": "largest load", **of},
+        "at_peak": {"long_name": "1: at the peak, 0: at the sample beside it", "units": "1"},
+    }
+    peak = np.stack([peaks[name].values for name, _, _ in HALVES])
+    arrays = {"time": when, "total": total, "peak": peak, "at_peak": at_peak.astype(float)}
+    data: dict[str, Any] = {name: (dims, arrays[name], about[name]) for name in arrays}
+    data["share"] = (("cause", *dims), share, {"long_name": "part along the load", **of})
+    return xr.Dataset(
+        data,
+        coords={
+            "cause": made.names,
+            "quantity": [name for name, _, _ in HALVES],
+            "joint": ("joint", names),
+        },
+        attrs={f"cause {name}": CAUSES[by][name] for name in made.names},
+    )
+
+
+class _Last:
+    """The shares of the sample asked for last: joints often have their peak together."""
+
+    def __init__(self, split: Split) -> None:
+        self._split, self._sample, self._shares = split, -1, np.zeros(0)
+
+    def at(self, sample: int) -> Array:
+        if sample != self._sample:
+            self._sample, self._shares = sample, self._split.shares(slice(sample, sample + 1))[0]
+        return self._shares
+
+
+def _larger_beside(run: RunLike, times: Array, time: float, half: int, joint: int) -> int:
+    """The sample beside a time at which a joint's force or moment is larger."""
+    after = int(np.searchsorted(times, time).clip(max=times.size - 1))
+    first = max(after - 1, 0) if times[after] != time else after
+    load = rows(run, "joint_load", slice(first, after + 1))[:, joint, 3 * half : 3 * half + 3]
+    return first + int(np.argmax(lengths(load)))
 
 
 def along_total(shares: Array) -> tuple[Array, Array]:

@@ -13,6 +13,7 @@ from linkwise.base import DERIVED, HALVES, AnyArray, Array, lengths
 from linkwise.loads.samples import blocks, joint_names, rows
 
 if TYPE_CHECKING:
+    from linkwise._core import Model
     from linkwise.loads.samples import RunLike
 
 _PREFIX = "extreme_"
@@ -55,6 +56,15 @@ class Extremes:
         return np.maximum(np.abs(self.minimum_reach), np.abs(self.maximum_reach))
 
 
+class State(NamedTuple):
+    """Positions, velocities, accelerations and drive torques of the machine, (..., n) each."""
+
+    q: Array
+    v: Array
+    a: Array
+    torque: Array
+
+
 def extremes_of(run: RunLike, name: str) -> Extremes | None:
     """Extremes of a recorded variable, or of the derived quantities (quantity, joint) by the name
     "quantity"; None where the run holds none: it is of an older linkwise, or was simulated without,
@@ -69,12 +79,16 @@ def _rows(run: RunLike, name: str, count: int) -> Array:
     """The `count` rows of one variable; InputError where the run has others or none."""
     held = run.dataset.get(_PREFIX + name)
     if held is None or held.shape[:1] != (count,):
-        shown = f"run {str(run.path)!r}" if run.path is not None else "run"
-        raise InputError(
-            f"{shown}: {_PREFIX}{name} is missing or has another shape than it was written with; "
-            "its files are damaged, simulate again"
-        )
+        raise _damaged(run, name)
     return rows(run, _PREFIX + name, slice(None))
+
+
+def _damaged(run: RunLike, name: str) -> InputError:
+    shown = f"run {str(run.path)!r}" if run.path is not None else "run"
+    return InputError(
+        f"{shown}: {_PREFIX}{name} is missing or has another shape than it was written with; "
+        "its files are damaged, simulate again"
+    )
 
 
 def load_at_extremes(run: RunLike) -> Array:
@@ -84,6 +98,19 @@ def load_at_extremes(run: RunLike) -> Array:
     assert found is not None
     load: Array = np.where(found.is_minimum[..., None], wrench[0], wrench[1])
     return load
+
+
+def states_at_peaks(run: RunLike, model: Model) -> State | None:
+    """The machine when force and moment of each joint were largest, parts of (half, joint, ...);
+    None where the run does not hold it: of machines with many joints, of a part of the joints,
+    without extremes. NaN where nothing was found."""
+    if f"{_PREFIX}state" not in run.dataset:
+        return None
+    held = _rows(run, "state", len(HALVES))
+    parts = np.cumsum([model.nq, model.nv, model.nv, model.nv])
+    if held.shape[1:] != (model.n_joints, parts[-1]):
+        raise _damaged(run, "state")
+    return State(*np.split(held, parts[:-1], axis=-1))
 
 
 def quantity_rows(names: list[str]) -> list[int]:

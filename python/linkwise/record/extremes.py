@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.base import COMPONENTS, DERIVED, AnyArray, Array
+from linkwise._core import peak_state_size
+from linkwise.base import COMPONENTS, DERIVED, HALVES, AnyArray, Array
 from linkwise.record.labels import text_array
 from linkwise.record.variable import Variable
 
@@ -22,6 +23,7 @@ ROWS = (
     *("maximum", "maximum_time", "maximum_reach"),
 )
 BOUNDS = ("minimum", "maximum")
+PEAKS = tuple(name for name, _, _ in HALVES)
 
 
 @dataclass(frozen=True)
@@ -53,12 +55,14 @@ class ExtremesLayout:
 
     parts: tuple[Part, ...]
     wrench: Variable
+    state: Variable | None
     width: int
     joints: int
 
     @property
     def variables(self) -> tuple[Variable, ...]:
-        return (*(part.variable for part in self.parts), self.wrench)
+        state = () if self.state is None else (self.state,)
+        return (*(part.variable for part in self.parts), self.wrench, *state)
 
     def split(self, flat: Array) -> dict[str, AnyArray]:
         """Arrays by name, of (..., size) numbers of the core."""
@@ -70,9 +74,14 @@ class ExtremesLayout:
             values = rows[..., part.first : part.first + count]
             values = values.reshape(*lead, len(ROWS), *part.shape)
             found[part.variable.name] = _taken(values, part.variable)
-        wrench = flat[..., len(ROWS) * self.width :]
+        rest = flat[..., len(ROWS) * self.width :]
         shape = (len(BOUNDS), len(DERIVED), self.joints, len(COMPONENTS))
-        found[self.wrench.name] = _taken(wrench.reshape(*lead, *shape), self.wrench)
+        count = int(np.prod(shape, dtype=np.int64))
+        wrench = rest[..., :count].reshape(*lead, *shape)
+        found[self.wrench.name] = _taken(wrench, self.wrench)
+        if self.state is not None:
+            states = rest[..., count:].reshape(*lead, *self.state.shape)
+            found[self.state.name] = np.ascontiguousarray(states)
         return found
 
     def empty(self) -> dict[str, AnyArray]:
@@ -126,13 +135,33 @@ def extremes_layout(model: Model, variables: Sequence[Variable]) -> ExtremesLayo
         load,
     )
     wrench = replace(wrench, attrs={**load.attrs, "long_name": "joint load at the extreme"})
-    return ExtremesLayout(tuple(parts), wrench, _flat_size(model), whole)
+    state = _state_variable(model, load) if set(_STATE) <= set(recorded) else None
+    return ExtremesLayout(tuple(parts), wrench, state, _flat_size(model), whole)
 
 
-def labels() -> Mapping[str, Any]:
+_STATE = ("position", "velocity", "acceleration", "drive_torque")
+
+
+def _state_variable(model: Model, load: Variable) -> Variable | None:
+    """What the loads at the peaks are made of; of runs of all joints, unless these are many."""
+    size = peak_state_size(model)
+    if load.take is not None or size == 0:
+        return None
+    names = ", ".join(f"{name}s" for name in _STATE).replace("_", " ")
+    about = {
+        "long_name": "state of the machine when this load was largest",
+        "convention": f"{names} of all joints, one after the other, in the model's order",
+        "units": "SI",
+    }
+    dims, shape = ("peak", "joint", "state"), (len(PEAKS), load.shape[0], size)
+    return Variable(f"{PREFIX}state", dims, shape, np.dtype(np.float64), about)
+
+
+def labels(layout: ExtremesLayout) -> Mapping[str, Any]:
     """Labels of the dimensions that extremes add."""
-    return {
+    found = {
         "extreme": text_array(ROWS),
         "bound": text_array(BOUNDS),
         "quantity": text_array(DERIVED),
     }
+    return found | ({"peak": text_array(PEAKS)} if layout.state is not None else {})

@@ -211,5 +211,5 @@ def build_schema(
     layout = extremes_layout(model, schema.variables) if extremes else None
     if layout is None:
         return schema
-    coordinates |= {name: Coordinate((name,), values) for name, values in labels().items()}
+    coordinates |= {name: Coordinate((name,), values) for name, values in labels(layout).items()}
     return replace(schema, extremes=layout)

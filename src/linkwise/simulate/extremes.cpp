@@ -80,6 +80,7 @@ Extremes::Extremes(const Setup& setup, const double* constant, std::span<const d
              std::vector<double>(6 * n_derived * joints(*model_), nan)},
       largest_{std::vector<double>(width_, -infinity), least_.time,
                std::vector<double>(width_, -infinity), least_.wrench},
+      states_(2 * joints(*model_) * state_size(*model_), nan),
       margin_(width_) {
   if (setup.any_given()) inverse_ = std::make_shared<BatchEvaluator>(*model_);
   // Functions of the caller's are asked while the step is the last one.
@@ -240,9 +241,20 @@ void Extremes::keep(size_t at) {
     }
     for (size_t c = begin; c < end && any; ++c) {
       if (values[c] < least_.value[c]) take(least_, c);
-      if (values[c] > largest_.value[c]) take(largest_, c);
+      if (values[c] > largest_.value[c]) {
+        take(largest_, c);
+        if (c < derived) keep_state(c, values + derived + 6 * nj);
+      }
     }
   });
+}
+
+/// Of the force and the moment of a joint: this is the motion at their new maximum.
+void Extremes::keep_state(size_t value, const double* motion) {
+  const size_t nj = joints(*model_), n = state_size(*model_);
+  const size_t derived = value / nj;
+  if (derived != force && derived != moment) return;
+  std::copy_n(motion, n, row(states_, (derived == moment ? nj : 0) + value % nj, n));
 }
 
 /// f(begin, end) for parts of the values that are worth one decision.
@@ -450,6 +462,7 @@ std::vector<double> Extremes::found() const {
   }
   for (const Extreme* extreme : {&whole.least_, &whole.largest_})
     out.insert(out.end(), extreme->wrench.begin(), extreme->wrench.end());
+  out.insert(out.end(), whole.states_.begin(), whole.states_.end());
   return out;
 }
 

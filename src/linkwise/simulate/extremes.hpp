@@ -39,10 +39,19 @@ class Extremes {
   /// Per value, in the order [derived][joint], [joint][6], [nq], [nv] of velocities, accelerations
   /// and drive torques: the minimum, its time, a bound on what it may have been between looks, and
   /// the same of the maximum, as six rows. Then the whole load at the minimum and at the maximum
-  /// of each derived quantity, [2][derived][joint][6]. NaN where a joint has no single axis.
+  /// of each derived quantity, [2][derived][joint][6], and the state when the force and when the
+  /// moment of each joint was largest, [2][joint][state_size]. NaN where a joint has no single
+  /// axis.
   static size_t size(const Model& model) {
-    return 6 * width(model) + 12 * n_derived * joints(model);
+    return 6 * width(model) + 12 * n_derived * joints(model) +
+           2 * joints(model) * state_size(model);
   }
+  /// Numbers of a state: [nq] and [nv] of velocities, accelerations and drive torques. None of
+  /// machines with more than most_with_states joints, where they would take most of the memory.
+  static size_t state_size(const Model& model) {
+    return model.n_joints() > most_with_states ? 0 : motion(model);
+  }
+  static constexpr int most_with_states = 50;
 
  private:
   /// States and what was found there, row by row.
@@ -79,9 +88,11 @@ class Extremes {
   };
 
   static size_t joints(const Model& model) { return static_cast<size_t>(model.n_joints()); }
+  static size_t motion(const Model& model) {
+    return static_cast<size_t>(model.nq()) + 3 * static_cast<size_t>(model.nv());
+  }
   static size_t width(const Model& model) {
-    return (n_derived + 6) * joints(model) + static_cast<size_t>(model.nq()) +
-           3 * static_cast<size_t>(model.nv());
+    return (n_derived + 6) * joints(model) + motion(model);
   }
 
   size_t append(double t, const double* q, const double* v);
@@ -90,6 +101,7 @@ class Extremes {
   void evaluate(std::span<const size_t> rows);
   void write_values(size_t row, const double* loads, const double* drive);
   void keep(size_t row);
+  void keep_state(size_t value, const double* motion);
   void measure();
   void digest(bool all);
   void search_inside(std::vector<Interval> open);
@@ -116,6 +128,7 @@ class Extremes {
   std::vector<End> ends_;
   size_t seen_ = 0, judged_ = 0;  ///< ends that were looked at, that begin an interval judged
   Extreme least_, largest_;
+  std::vector<double> states_;  ///< see size()
   std::vector<double> margin_;
   std::vector<Near> near_;
 };

@@ -22,7 +22,8 @@ std::vector<double> extremes_until(double end, int samples, SimulationOptions op
 // Of a pendulum let go at an angle a, the rod carries m g (3 - 2 cos a) at the bottom.
 TEST(Extremes, AreFoundBetweenSamples) {
   const auto model = make_model(pendulum());
-  const size_t width = (Extremes::size(*model) - 12 * Extremes::n_derived) / 6;
+  const size_t states = 2 * Extremes::state_size(*model);
+  const size_t width = (Extremes::size(*model) - 12 * Extremes::n_derived - states) / 6;
   const double bottom = 9.81 * (3 - 2 * std::cos(let_go));
   for (const std::string_view kind : all_kinds()) {
     const auto found = extremes_until(2, 1, fixed_step(1e-2, kind));
@@ -35,6 +36,9 @@ TEST(Extremes, AreFoundBetweenSamples) {
     EXPECT_GE(maximum[2 * width], maximum[0]) << kind;  // its reach
     const double* position = found.data() + 13;
     EXPECT_LT(position[0], -0.8 * let_go) << kind;
+    const double* state = found.data() + found.size() - states;  // when the force was largest
+    EXPECT_NEAR(state[0], 0, 0.05) << kind;
+    EXPECT_NEAR(std::abs(state[1]), std::abs(maximum[position - found.data() + 1]), room) << kind;
   }
 }
 

@@ -80,8 +80,11 @@ def test_json_is_the_summary(linkwise, run):
     radial = peaks["elbow", "radial"]
     assert radial["margin"] == pytest.approx(100 / radial["peak"] - 1)
     for share in found["split"]:
-        fixed = ("joint", "quantity", "unit", "time", "peak")
-        assert share["peak"] == pytest.approx(sum(v for k, v in share.items() if k not in fixed))
+        fixed = ("joint", "quantity", "unit", "at_peak", "time", "total", "peak")
+        assert share["total"] == pytest.approx(sum(v for k, v in share.items() if k not in fixed))
+        assert share["at_peak"]
+        assert share["total"] == pytest.approx(share["peak"], rel=1e-6)
+        assert share["time"] == peaks[share["joint"], share["quantity"]]["peak_time"]
 
 
 def test_one_joint_in_full_and_csv(linkwise, run):

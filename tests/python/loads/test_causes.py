@@ -7,9 +7,10 @@ import pytest
 
 import linkwise as lw
 from helpers.loaded_arm import arm, profile
-from helpers.machines import G, rod_chain
+from helpers.machines import G, rod_chain, stopped_arm
 from helpers.random_trees import JOINT_TYPES, make_tree, random_configuration
 from linkwise import _core
+from linkwise.loads.extremes import MISSED
 
 
 @pytest.mark.parametrize("by", ["force", "motion"])
@@ -239,3 +240,65 @@ def test_a_split_needs_all_joints():
     run = lw.simulate(arm(), duration=0.1, every=0.05, record=lw.Recording(joints=["elbow"]))
     with pytest.raises(lw.InputError, match="1 of 3 joints"):
         lw.loads.split(run)
+
+
+@pytest.mark.parametrize("by", ["force", "motion"])
+def test_shares_at_a_blow_between_samples(by):
+    """They add up to the peak that no sample shows, and are those of a sample put there."""
+    machine = stopped_arm(1e7)
+    run = lw.simulate(machine, duration=1.0, every=0.25)
+    found = lw.loads.split_at_peaks(run, by)
+    assert found.at_peak.values.all()
+    np.testing.assert_allclose(found.total, found.peak, rtol=1e-6)
+    np.testing.assert_allclose(found.share.sum("cause"), found.total, rtol=1e-9)
+    peaks = lw.loads.peak_loads(run)
+    for half, (name, part) in enumerate((("force", slice(0, 3)), ("moment", slice(3, 6)))):
+        sampled = np.linalg.norm(run.joint_load.values[..., part], axis=-1).max()
+        assert float(found.peak[half].max()) > 3 * sampled
+        np.testing.assert_array_equal(found.time[half], peaks[f"{name}_time"])
+    when = np.unique(found.time.values)
+    twin = lw.loads.split(lw.simulate(machine, times=[0, *when]), by).sel(time=when)
+    for j, joint in enumerate(machine.joint_names):
+        for half, part in enumerate((slice(0, 3), slice(3, 6))):
+            at = twin.sel(joint=joint).isel(time=np.searchsorted(when, found.time[half, j]))
+            total = at.values.sum(axis=0)[part]
+            expected = at.values[:, part] @ total / np.linalg.norm(total)
+            np.testing.assert_allclose(
+                found.share[:, half, j], expected, rtol=5e-3, atol=5e-3 * np.abs(expected).max()
+            )
+
+
+def test_shares_beside_a_peak_whose_state_is_not_held():
+    run = lw.simulate(stopped_arm(1e7), duration=1.0, every=0.25)
+    without = lw.Run(run.dataset.drop_vars("extreme_state"), model=run.load_model())
+    found = lw.loads.split_at_peaks(without)
+    assert not found.at_peak.values.any()
+    assert np.isin(found.time, run.time).all()
+    assert (found.total < found.peak / 3).all()
+    sampled = np.linalg.norm(run.joint_load.values[..., :3], axis=-1)
+    np.testing.assert_allclose(
+        found.total[0], sampled[np.searchsorted(run.time, found.time[0]), [0, 1]], rtol=1e-9
+    )
+    many = lw.simulate(lw.scenes.chain(51), duration=0.01, every=0.01)
+    assert "extreme_state" not in many
+    damaged = lw.Run(run.dataset.isel(state=slice(1)), model=run.load_model())
+    with pytest.raises(lw.InputError, match="extreme_state is missing or has another shape"):
+        lw.loads.split_at_peaks(damaged)
+
+
+@pytest.mark.parametrize("pulse", [False, True])
+def test_a_wrench_that_changes_between_samples_is_not_guessed(pulse):
+    """At the top of a pulse that no sample meets the wrench is not known."""
+    times, push = [0, 0.101, 0.102, 0.103, 1.0], np.zeros((5, 6))
+    push[:, 0] = 3.0
+    push[2, 0] = 5000.0 if pulse else 3.0
+    run = lw.simulate(
+        arm(), duration=1.0, every=0.1, wrenches={"hand": lw.Wrench(lw.Table(times, push))}
+    )
+    found = lw.loads.split_at_peaks(run)
+    if pulse:
+        assert not found.at_peak.sel(quantity="force").values.any()
+        assert (found.total < found.peak).sel(quantity="force").all()
+    else:
+        assert found.at_peak.values.all()
+        np.testing.assert_allclose(found.total, found.peak, rtol=MISSED)
