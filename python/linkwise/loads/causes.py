@@ -122,8 +122,8 @@ class Split:
             return shares
         there = ~np.isnan(states.q).any(axis=-1)
         half, joint = np.nonzero(there)
-        outside = self._external_at(when[there])
-        evaluated = self._of(*(part[there] for part in states), outside)
+        q, v, a, torque = (part[there] for part in states)
+        evaluated = self._of(q, v, a, torque, self._external_at(when[there]))
         own = evaluated[np.arange(joint.size), :, joint]
         known = load_at_extremes(self.run)[quantity_rows([HALVES[h][0] for h in half]), joint]
         off, size = (

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from linkwise.base import DERIVED, Array, lengths
+from linkwise.loads.extremes import what_samples_miss
 from linkwise.loads.samples import Selection, joint_names, model_of, need, rows, select
 
 if TYPE_CHECKING:
@@ -151,7 +152,8 @@ def quantities(run: RunLike, model: Model | None = None) -> xr.Dataset:
         Dataset over (time, joint): `force`, `axial`, `radial`, `moment`, `tilting_moment`,
         `torque`, `drive_power`, `drive_energy` [J] (the power's integral since the first sample,
         along the integration's steps where the run holds `work`, else by Simpson's rule). NaN
-        where a joint has no single axis.
+        where a joint has no single axis. The attribute `samples` says what these miss of the
+        peaks, which `summary` has.
     """
     import xarray as xr
 
@@ -172,4 +174,4 @@ def quantities(run: RunLike, model: Model | None = None) -> xr.Dataset:
             "convention": f"integral of drive_power since the first sample, {how}",
         }
         data["drive_energy"] = (("time", "joint"), energy, attrs)
-    return xr.Dataset(data, coords=coords)
+    return xr.Dataset(data, coords=coords, attrs={"samples": what_samples_miss(run)})

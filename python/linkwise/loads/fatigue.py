@@ -1,4 +1,8 @@
-"""Load cycles and what they damage, load durations, spectra."""
+"""Load cycles and what they damage, load durations, spectra.
+
+All of it is of the samples, with the largest and the smallest value between them where cycles are
+counted. The attribute `samples` of every result says what the samples miss.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,7 @@ from linkwise._core import InputError, as_floats
 from linkwise.base import COMPONENTS, Array
 from linkwise.io.complaint import check_one_of, shown
 from linkwise.loads.engineering import QUANTITIES, derive, drive_power, has_power, joint_directions
+from linkwise.loads.extremes import extremes_of, quantity_rows, what_samples_miss
 from linkwise.loads.samples import (
     joint_names,
     joint_position,
@@ -60,6 +65,25 @@ def signal(
     return values, QUANTITIES[quantity].units
 
 
+def _turning(run: RunLike, values: Array, joint: int, quantity: str) -> Array:
+    """A signal (time,) with the extremes that it has between the samples put in where they were."""
+    component = quantity in COMPONENTS
+    between = extremes_of(run, "joint_load" if component else "quantity")
+    if between is None:
+        return values
+    at = (joint, COMPONENTS.index(quantity)) if component else (quantity_rows([quantity])[0], joint)
+    found = [
+        (float(when[at]), float(value[at]))
+        for value, when, beyond in (
+            (between.minimum, between.minimum_time, between.minimum[at] < values.min()),
+            (between.maximum, between.maximum_time, between.maximum[at] > values.max()),
+        )
+        if beyond
+    ]
+    times, extremes = np.array(sorted(found)).reshape(-1, 2).T
+    return np.insert(values, np.searchsorted(run.dataset["time"].values, times), extremes)
+
+
 def _rainflow() -> object:
     try:
         import rainflow
@@ -81,19 +105,22 @@ def cycles(run: RunLike, joint: str, quantity: str, model: Model | None = None) 
     """Rainflow cycles of one quantity or component of one joint.
 
     Returns:
-        Dataset over `cycle`: `range`, `mean` and `count` (1, or 0.5 for half cycles).
+        Dataset over `cycle`: `range`, `mean` and `count` (1, or 0.5 for half cycles). The largest
+        and the smallest value between the samples are counted where the run holds its extremes;
+        lesser turns that the samples miss are not.
     """
     import xarray as xr
 
     values, units = signal(run, joint, quantity, model)
-    counted = _count(values)
+    counted = _count(_turning(run, values, joint_position(run, joint), quantity))
     about = {"range": ("range of the cycle", units), "mean": ("mean of the cycle", units)}
     about["count"] = ("whole or half cycle", "1")
     data = {
         name: ("cycle", counted[:, k], {"long_name": text, "units": unit})
         for k, (name, (text, unit)) in enumerate(about.items())
     }
-    return xr.Dataset(data, attrs={"joint": joint, "quantity": quantity, "method": "ASTM E1049"})
+    about_run = {"method": "ASTM E1049", "samples": what_samples_miss(run, [joint])}
+    return xr.Dataset(data, attrs={"joint": joint, "quantity": quantity, **about_run})
 
 
 def equivalent(ranges: Array, counts: Array, exponent: float, repetitions: float) -> float:
@@ -122,7 +149,8 @@ def damage_equivalent(
         joints: All by default.
 
     Returns:
-        DataArray (exponent, joint, component), peak to peak, N and N m.
+        DataArray (exponent, joint, component), peak to peak, N and N m. Cycles are those of
+        `cycles`.
     """
     import xarray as xr
 
@@ -145,8 +173,8 @@ def damage_equivalent(
     load = rows(run, "joint_load", slice(None))[:, where]
     found = np.zeros((slopes.size, len(names), len(COMPONENTS)))
     for j in range(len(names)):
-        for c in range(len(COMPONENTS)):
-            counted = _count(load[:, j, c])
+        for c, component in enumerate(COMPONENTS):
+            counted = _count(_turning(run, load[:, j, c], where[j], component))
             for k, m in enumerate(slopes):
                 found[k, j, c] = equivalent(counted[:, 0], counted[:, 2], float(m), count)
     given = run.dataset["joint_load"]
@@ -162,6 +190,7 @@ def damage_equivalent(
             **given.attrs,
             "long_name": f"damage-equivalent load range for {count:g} cycles",
             "method": "rainflow (ASTM E1049) and linear damage (Palmgren, Miner)",
+            "samples": what_samples_miss(run, names),
         },
         name="damage_equivalent",
     )
@@ -188,7 +217,12 @@ def load_duration(
         time,
         dims="level",
         coords={"level": ("level", (edges[1:] + edges[:-1]) / 2, level)},
-        attrs={"long_name": "time in the class", "units": "s", "class_width": edges[1] - edges[0]},
+        attrs={
+            "long_name": "time in the class",
+            "units": "s",
+            "class_width": edges[1] - edges[0],
+            "samples": what_samples_miss(run, [joint]),
+        },
         name="load_duration",
     )
 
@@ -214,6 +248,10 @@ def spectrum(run: RunLike, joint: str, quantity: str, model: Model | None = None
         density,
         dims="frequency",
         coords={"frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"})},
-        attrs={"long_name": f"spectral density of {quantity}", "units": f"({units})^2/Hz"},
+        attrs={
+            "long_name": f"spectral density of {quantity}",
+            "units": f"({units})^2/Hz",
+            "samples": what_samples_miss(run, [joint]),
+        },
         name="spectrum",
     )

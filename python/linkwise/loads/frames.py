@@ -12,6 +12,7 @@ from linkwise import _core
 from linkwise._core import Frame, InputError, as_floats
 from linkwise.base import Array
 from linkwise.io.complaint import check_one_of, near, shown
+from linkwise.loads.extremes import what_samples_miss
 from linkwise.loads.samples import model_of, need_whole, rows
 from linkwise.loads.welds import Weld
 
@@ -215,7 +216,8 @@ def in_frame(
 
     Returns:
         DataArray (time, joint, component), without joint for a single one; `attrs` state frame,
-        point and convention. Of an array an array (..., joint, 6), or (..., 6).
+        point, convention, and what the samples miss of the peaks. Of an array an array
+        (..., joint, 6), or (..., 6).
 
     Raises:
         InputError: the frame or joint is unknown, shapes are wrong, the run lacks a quantity, or
@@ -249,6 +251,8 @@ def _run_in_frame(
     found = _of_run(run, machine, names)
     q = rows(run, "position", slice(None))
     moved, attrs = _in_frame(machine, q, found, frame, at, fixed_in)
+    own = set(names) <= set(machine.joint_names)
+    attrs["samples"] = what_samples_miss(run, names if own else None)
     made = _labelled(run, names, moved, attrs)
     return made.isel(joint=0) if isinstance(joint, str) else made
 

@@ -39,7 +39,7 @@ class _Statistics:
         self.peak, self.peak_time = np.full(shape, np.nan), np.full(shape, np.nan)
         self.minimum, self.maximum = np.full(shape, np.inf), np.full(shape, -np.inf)
         self.total, self.squares = np.zeros(shape), np.zeros(shape)
-        self.sampling = np.zeros(shape)
+        self.sampled, self.sampling = np.zeros(shape), np.zeros(shape)
         self.wrench = np.full((*shape, 6), np.nan)
         self.reach: Array | None = None
 
@@ -58,6 +58,13 @@ class _Statistics:
         more: Array = np.maximum(self.reach - self.largest, 0.0)
         return more
 
+    def unseen(self) -> Array:
+        """The share of the peak that no sample shows."""
+        if self.reach is None:
+            return np.full_like(self.peak, np.nan)
+        share: Array = 1 - self.sampled / np.where(self.largest > 0, self.largest, np.inf)
+        return np.where(self.largest > 0, share, 0.0)
+
     def add(
         self, values: Array, load: Array, times: Array, weights: Array, first: int, count: int
     ) -> None:
@@ -72,6 +79,7 @@ class _Statistics:
         size = np.abs(inner)
         at = np.argmax(np.where(np.isnan(size), -1.0, size), axis=1)
         best = np.take_along_axis(size, at[:, None], axis=1)[:, 0]
+        self.sampled = np.fmax(self.sampled, best)
         better = best > self.largest  # False for NaN
         quantity, joint = np.nonzero(better)
         k = at[better]
@@ -143,8 +151,8 @@ def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
         "peak": (collected.peak, "value of largest magnitude"),
         "minimum": (np.where(absent, np.nan, collected.minimum), "smallest value"),
         "maximum": (np.where(absent, np.nan, collected.maximum), "largest value"),
-        "mean": (collected.total / span, "mean over time"),
-        "rms": (np.sqrt(collected.squares / span), "root mean square over time"),
+        "mean": (collected.total / span, "mean over time, of the samples"),
+        "rms": (np.sqrt(collected.squares / span), "root mean square over time, of the samples"),
         "sampling": (
             np.where(absent, np.nan, collected.missed()),
             "what a peak that was not found may add",
@@ -158,9 +166,12 @@ def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
     }
     attrs = {"long_name": "time of the peak", "units": "s"}
     data["peak_time"] = (dims, collected.peak_time, attrs)
-    about_duty = f"share of the time above {DUTY_LEVEL:g} of the peak's magnitude"
+    about_duty = f"share of the samples' time above {DUTY_LEVEL:g} of the peak's magnitude"
     duty = np.where(absent, np.nan, np.minimum(duty / span, 1.0))
     data["duty"] = (dims, duty, {"long_name": about_duty, "units": "1"})
+    about_missed = "share of the peak that no sample shows"
+    unseen = np.where(absent, np.nan, collected.unseen())
+    data["missed"] = (dims, unseen, {"long_name": about_missed, "units": "1"})
     given = run.dataset["joint_load"]
     data["wrench"] = ((*dims, "component"), collected.wrench, dict(given.attrs))
     return xr.Dataset(

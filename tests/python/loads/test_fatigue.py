@@ -5,12 +5,12 @@ import pytest
 import xarray as xr
 
 import linkwise as lw
-from helpers.machines import pendulum
+from helpers.machines import pendulum, stopped_arm
 
 
 def run_with(signal, times):
     """A run of the pendulum whose fx is this signal."""
-    made = lw.simulate(pendulum(), times=times)
+    made = lw.simulate(pendulum(), times=times, extremes=False)
     load = made.joint_load.copy()
     load.values[:] = 0
     load.values[:, 0, 0] = signal
@@ -72,3 +72,33 @@ def test_the_spectrum_has_its_peak_and_its_power():
 def test_wrong_arguments(call, complaint):
     with pytest.raises(lw.InputError, match=complaint):
         call(run_with(T, T))
+
+
+def test_the_largest_cycle_is_counted_whatever_the_sampling():
+    """Of a blow on a stiff stop 21 samples show a small part."""
+    coarse, fine = (
+        lw.simulate(stopped_arm(1e7), times=np.linspace(0, 1, samples)) for samples in (21, 20_001)
+    )
+    for joint, quantity in (("shoulder", "ny"), ("elbow", "fx"), ("elbow", "moment")):
+        sampled = lw.loads.cycles(lw.Run(coarse.dataset.drop_vars(EXTREMES)), joint, quantity, ARM)
+        found, expected = (
+            float(lw.loads.cycles(run, joint, quantity).range.max()) for run in (coarse, fine)
+        )
+        assert found == pytest.approx(expected, rel=5e-3)
+        assert float(sampled.range.max()) < 0.7 * expected
+        assert "not known" in sampled.attrs["samples"]
+    said = lw.loads.cycles(coarse, "shoulder", "ny").attrs["samples"]
+    assert "joint 'shoulder' peaks between the samples" in said
+    assert "show every peak" in lw.loads.cycles(fine, "shoulder", "ny").attrs["samples"]
+    # At slope 10 the largest cycle does the damage.
+    damage = (
+        lw.loads.damage_equivalent(run, exponents=[10], repetitions=1) for run in (coarse, fine)
+    )
+    few, many = (found.sel(component=["fx", "ny"]) for found in damage)
+    np.testing.assert_allclose(few, many, rtol=0.1)
+
+
+ARM = stopped_arm(1e7)
+EXTREMES = [
+    f"extreme_{name}" for name in ("quantity", "joint_load", "position", "velocity", "acceleration")
+]
