@@ -21,9 +21,9 @@ AxisSpec axis_spec(nb::handle item) {
   return {AxisKind::revolute, vec3(item, "axis"), 0};
 }
 
-void add_joint(ModelBuilder& builder, std::string name, const std::string& type, std::string parent,
-               std::string child, nb::handle translation, nb::handle rotation, nb::handle axis,
-               nb::handle axes, double pitch, nb::handle initial, const nb::kwargs& properties) {
+JointSpec joint_spec(std::string name, std::string parent, std::string child,
+                     nb::handle translation, nb::handle rotation, nb::handle axis, nb::handle axes,
+                     nb::handle initial) {
   JointSpec joint;
   joint.name = std::move(name);
   joint.parent = std::move(parent);
@@ -38,7 +38,28 @@ void add_joint(ModelBuilder& builder, std::string name, const std::string& type,
     const ArrayIn given = as_array(initial, "initial");
     joint.initial.assign(given.data(), given.data() + given.size());
   }
-  builder.add_joint(std::move(joint), type, pitch, properties_from(properties));
+  return joint;
+}
+
+void add_joint(ModelBuilder& builder, std::string name, const std::string& type, std::string parent,
+               std::string child, nb::handle translation, nb::handle rotation, nb::handle axis,
+               nb::handle axes, double pitch, nb::handle initial, const nb::kwargs& properties) {
+  builder.add_joint(joint_spec(std::move(name), std::move(parent), std::move(child), translation,
+                               rotation, axis, axes, initial),
+                    type, pitch, properties_from(properties));
+}
+
+void add_loop(ModelBuilder& builder, std::string name, const std::string& type, std::string parent,
+              std::string child, nb::handle translation, nb::handle rotation,
+              nb::handle child_translation, nb::handle child_rotation, nb::handle axis,
+              nb::handle axes, double pitch, const nb::kwargs& properties) {
+  LoopJointSpec loop;
+  loop.joint = joint_spec(std::move(name), std::move(parent), std::move(child), translation,
+                          rotation, axis, axes, nb::none());
+  if (!child_translation.is_none())
+    loop.child_translation = vec3(child_translation, "child_translation");
+  if (!child_rotation.is_none()) loop.child_rotation = mat3(child_rotation, "child_rotation");
+  builder.add_loop_joint(std::move(loop), type, pitch, properties_from(properties));
 }
 
 /// A chain of equal links made without Python objects: N in the millions.
@@ -110,16 +131,61 @@ void bind_chain(nb::module_& m) {
         "floating_base"_a = false);
 }
 
+void bind_joints(nb::class_<ModelBuilder>& builder) {
+  builder
+      .def("add_joint", &add_joint, "name"_a, "type"_a, "parent"_a, "child"_a, nb::kw_only(),
+           "translation"_a = nb::none(), "rotation"_a = nb::none(), "axis"_a = nb::none(),
+           "axes"_a = nb::none(), "pitch"_a = 0.0, "initial"_a = nb::none(), "properties"_a,
+           R"(Adds a joint between two links.
+
+Args:
+    name: unique among joints.
+    type: fixed, revolute, continuous, prismatic, helical, cylindrical, universal, spherical,
+        planar, floating or composite.
+    parent, child: names of links.
+    translation: (3,) [m]; rotation: (3, 3). They place the joint frame in the parent link's frame;
+        None: in its origin, parallel to it.
+    axis: (3,) in the joint frame, the normal of a planar joint; None: z.
+    axes: two for universal, a list of (kind, axis) or ("helical", axis, pitch) for composite.
+    pitch: of helical [m/rad].
+    initial: the joint's coordinates [rad, m] where a simulation starts; None: its zero position.
+    properties: damping, friction, friction_velocity, stiffness, rest_position, armature (or
+        motor_inertia and gear_ratio), lower, upper, effort, velocity, limit_stiffness,
+        limit_damping; one value, or one per degree of freedom. Units as in Model.with_joint.
+
+Raises:
+    InputError: a type, property or shape is wrong; what concerns several elements, build checks.)")
+      .def("add_loop", &add_loop, "name"_a, "type"_a, "parent"_a, "child"_a, nb::kw_only(),
+           "translation"_a = nb::none(), "rotation"_a = nb::none(),
+           "child_translation"_a = nb::none(), "child_rotation"_a = nb::none(),
+           "axis"_a = nb::none(), "axes"_a = nb::none(), "pitch"_a = 0.0, "properties"_a,
+           R"(Adds a joint that closes a loop: each of its links hangs on another joint already.
+
+Args:
+    name: unique among joints.
+    type, axis, axes, pitch, properties: as in add_joint; a composite joint cannot close a loop.
+    parent, child: names of links, or the root link for the ground.
+    translation: (3,) [m]; rotation: (3, 3). They place the joint frame in the parent link's frame;
+        None: in its origin, parallel to it.
+    child_translation, child_rotation: the same in the child link's frame. At zero coordinates the
+        two frames are one.
+
+Raises:
+    InputError: as add_joint.)");
+}
+
 }  // namespace
 
 void bind_builder(nb::module_& m) {
   bind_note(m);
-  nb::class_<ModelBuilder>(
+  nb::class_<ModelBuilder> builder(
       m, "ModelBuilder",
       "Collects links and joints by name; build() checks them and gives the immutable Model.\n\n"
       "SI units. Frames as in URDF: a joint's frame is placed in its parent link's frame; the "
       "child\n"
-      "link's frame coincides with it when the joint is at zero.")
+      "link's frame coincides with it when the joint is at zero.");
+  bind_joints(builder);
+  builder
       .def(
           "__init__",
           [](ModelBuilder* self, std::string name, nb::object gravity, std::string source) {
@@ -143,28 +209,6 @@ Args:
 
 Raises:
     InputError: an array has another shape, or a number is not finite.)")
-      .def("add_joint", &add_joint, "name"_a, "type"_a, "parent"_a, "child"_a, nb::kw_only(),
-           "translation"_a = nb::none(), "rotation"_a = nb::none(), "axis"_a = nb::none(),
-           "axes"_a = nb::none(), "pitch"_a = 0.0, "initial"_a = nb::none(), "properties"_a,
-           R"(Adds a joint between two links.
-
-Args:
-    name: unique among joints.
-    type: fixed, revolute, continuous, prismatic, helical, cylindrical, universal, spherical,
-        planar, floating or composite.
-    parent, child: names of links.
-    translation: (3,) [m]; rotation: (3, 3). They place the joint frame in the parent link's frame;
-        None: in its origin, parallel to it.
-    axis: (3,) in the joint frame, the normal of a planar joint; None: z.
-    axes: two for universal, a list of (kind, axis) or ("helical", axis, pitch) for composite.
-    pitch: of helical [m/rad].
-    initial: the joint's coordinates [rad, m] where a simulation starts; None: its zero position.
-    properties: damping, friction, friction_velocity, stiffness, rest_position, armature (or
-        motor_inertia and gear_ratio), lower, upper, effort, velocity, limit_stiffness,
-        limit_damping; one value, or one per degree of freedom. Units as in Model.with_joint.
-
-Raises:
-    InputError: a type, property or shape is wrong; what concerns several elements, build checks.)")
       .def("add_note", &ModelBuilder::add_note, "level"_a, "element"_a, "text"_a,
            R"(Adds a note for Model.notes, as readers of files do about what they leave out.
 

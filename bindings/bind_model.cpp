@@ -48,16 +48,20 @@ ModelSpec from_bytes(const nb::bytes& description) {
   for (const Note& note : spec.notes)
     for (const std::string* text : {&note.element, &note.text}) check_text(*text);
   for (const LinkSpec& link : spec.links) check_text(link.name);
-  for (const JointSpec& joint : spec.joints)
+  const auto check_joint = [](const JointSpec& joint) {
     for (const std::string* text : {&joint.name, &joint.parent, &joint.child}) check_text(*text);
+  };
+  for (const JointSpec& joint : spec.joints) check_joint(joint);
+  for (const LoopJointSpec& loop : spec.loop_joints) check_joint(loop.joint);
   return spec;
 }
 
 /// Fixed joints that are no joints of the model, because their links are merged.
 nb::list welds(const PyModel& self) {
   const std::vector<JointSpec>& joints = self.model->spec().joints;
-  std::vector<char> merged(joints.size() + 1, 1);
+  std::vector<char> merged(joints.size() + self.model->spec().loop_joints.size() + 1, 1);
   for (const JointInfo& joint : self.model->joints) merged[joint.spec] = 0;
+  for (const LoopJoint& loop : self.model->loops.joints) merged[loop.joint.spec] = 0;
   nb::list out;
   for (size_t j = 0; j < joints.size(); ++j)
     if (merged[j]) out.append(nb::make_tuple(joints[j].name, joints[j].parent, joints[j].child));

@@ -29,7 +29,8 @@ TARGETS: tuple[str, ...]
 
 # Parameters that a binding takes as a Python object, by their name.
 ARRAYS = (
-    "acceleration axes axis breakpoints com directions external f gravity guess inertia initial "
+    "acceleration axes axis breakpoints child_rotation child_translation com directions external f "
+    "gravity guess inertia initial "
     "origin prescribed q q0 rotation target tau times translation v v0 value values"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {

@@ -20,6 +20,7 @@ TreeSystem::TreeSystem(const Model& model, const Executor& executor)
       a_(model.n_bodies()),
       off_(model.n_bodies()),
       moved_(model.n_bodies()) {
+  refuse_loops(model, "A f = b of a tree");
   require_regular_inertias(model);
   std::vector<int> parent, dim;
   const auto& armature = model.dof_values(DofProperty::armature);

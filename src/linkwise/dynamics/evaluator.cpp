@@ -321,6 +321,7 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
                      "' does not split loads; use articulated_body or constraint_force");
   const bool by_force = method == "constraint_force";
   require_known_bodies(m, find_dynamics(method));
+  refuse_loops(m, "loads by cause");
   if (by_force) require_regular_inertias(m);
   BatchInput s = states;
   std::vector<double> passive;
@@ -345,6 +346,7 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
 void Evaluator::inverse_dynamics(size_t count, const BatchInput& states, const Executor& executor,
                                  double* tau, double* loads, const GoOn& go_on) const {
   const Model& m = *model_;
+  refuse_loops(m, "inverse dynamics");
   check(m, count, states);
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);
@@ -357,6 +359,7 @@ void Evaluator::inverse_dynamics(size_t count, const BatchInput& states, const E
 void Evaluator::mass_matrix(size_t count, const double* q, const Executor& executor, double* H,
                             const GoOn& go_on) const {
   const Model& m = *model_;
+  refuse_loops(m, "the mass matrix");
   const size_t nv = m.nv();
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);

@@ -172,6 +172,7 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
   }
   const DynamicsEntry& entry = find_dynamics(choice.method);
   require_known_bodies(model, entry);
+  refuse_loops(model, "method " + std::string(entry.name));
   if (!entry.uses_solver)
     choice.solver = "";
   else if (choice.solver == "auto")

@@ -11,7 +11,8 @@ struct MachineGraph {
     int freedom = 1;    ///< degrees of freedom
     /// Has a drive, spring, damper, friction, armature or limits: acts along its own coordinates.
     bool acts = false;
-    bool weld = false;  ///< makes one piece of its two links
+    bool weld = false;    ///< makes one piece of its two links
+    bool closes = false;  ///< is a loop joint, whatever the links hang on
   };
   int ground = 0;              ///< the link that does not move; what hangs on it comes first
   std::vector<char> massless;  ///< by link: has neither mass nor inertia

@@ -30,12 +30,12 @@ struct Outboard {
 class Choice {
  public:
   explicit Choice(const MachineGraph& graph)
-      : graph_(graph), outboard_(graph, [](int) { return true; }) {
+      : graph_(graph), outboard_(graph, [&](int j) { return !graph.joints[j].closes; }) {
     const int n = graph.n_links();
     inboard.assign(n, -1);
     depth_.assign(n, -1);
     unmet_.assign(n, 0);
-    for (const auto& joint : graph.joints) ++unmet_[joint.child];
+    for (const auto& joint : graph.joints) unmet_[joint.child] += !joint.closes;
     std::vector<char> is_child(n);
     for (int link = 0; link < n; ++link) is_child[link] = unmet_[link] > 0;
     grow(graph.ground);

@@ -111,8 +111,8 @@ ModelBuilder::ModelBuilder(std::string name, const Vec3<double>& gravity, std::s
   spec_.source = std::move(source);
 }
 
-void ModelBuilder::add_joint(JointSpec joint, const std::string& type, double pitch,
-                             Properties properties) {
+void ModelBuilder::complete(JointSpec& joint, const std::string& type, double pitch,
+                            Properties properties) const {
   try {
     joint.type = joint_type_from_name(type);
     set_properties(joint, std::move(properties));
@@ -121,7 +121,18 @@ void ModelBuilder::add_joint(JointSpec joint, const std::string& type, double pi
   }
   if (joint.axes.empty() && joint.type != JointType::composite) joint.axes.emplace_back();
   if (joint.type == JointType::helical) joint.axes[0].pitch = pitch;
+}
+
+void ModelBuilder::add_joint(JointSpec joint, const std::string& type, double pitch,
+                             Properties properties) {
+  complete(joint, type, pitch, std::move(properties));
   spec_.joints.push_back(std::move(joint));
+}
+
+void ModelBuilder::add_loop_joint(LoopJointSpec loop, const std::string& type, double pitch,
+                                  Properties properties) {
+  complete(loop.joint, type, pitch, std::move(properties));
+  spec_.loop_joints.push_back(std::move(loop));
 }
 
 void ModelBuilder::add_note(const std::string& level, std::string element, std::string text) {
@@ -172,6 +183,7 @@ ModelSpec with_joints(ModelSpec spec,
                       std::vector<std::pair<std::string, Properties>> properties_of) {
   std::unordered_map<std::string, JointSpec*> by_name;
   for (JointSpec& joint : spec.joints) by_name.emplace(joint.name, &joint);
+  for (LoopJointSpec& loop : spec.loop_joints) by_name.emplace(loop.joint.name, &loop.joint);
   for (auto& [name, properties] : properties_of) {
     const std::string head = "joint '" + name + "'" + source_of(spec) + ": ";
     const auto found = by_name.find(name);

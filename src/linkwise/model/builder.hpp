@@ -34,6 +34,10 @@ class ModelBuilder {
   /// that of a helical joint, m/rad. Throws InputError where the type or a property is unknown.
   void add_joint(JointSpec joint, const std::string& type, double pitch, Properties properties);
 
+  /// The same for a joint that closes a loop: its links hang on other joints.
+  void add_loop_joint(LoopJointSpec loop, const std::string& type, double pitch,
+                      Properties properties);
+
   /// level: "merge", "warning" or "info".
   void add_note(const std::string& level, std::string element, std::string text);
   void set_floating_base(std::string joint_name);
@@ -42,6 +46,9 @@ class ModelBuilder {
   ModelSpec spec(bool keep_fixed = false) const;
 
  private:
+  void complete(JointSpec& joint, const std::string& type, double pitch,
+                Properties properties) const;
+
   ModelSpec spec_;
 };
 

@@ -87,7 +87,7 @@ LumpedInertia lump_inertia(const Machine& machine, const Lumps& lumps, std::vect
   }
   for (int j : lumps.welds) {
     const JointSpec& s = machine.joint(j);
-    const auto& [parent, child, freedom, acts, weld] = machine.graph.joints[j];
+    const int parent = machine.graph.joints[j].parent, child = machine.graph.joints[j].child;
     const int lead = lumps.lead[child];
     check_weld(machine, lead, child, s.name);
     out.from_lead[child] =

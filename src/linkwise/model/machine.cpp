@@ -12,11 +12,13 @@ namespace {
 
 NameIndex index_joints(const ModelSpec& spec, const std::string& where) {
   NameIndex names;
-  names.reset(spec.joints.size());
-  for (size_t i = 0; i < spec.joints.size(); ++i)
-    if (!names.insert(
-            static_cast<int>(i), [&](int k) -> const auto& { return spec.joints[k].name; }))
-      throw InputError("joint '" + spec.joints[i].name + "'" + where +
+  const JointSpec none;
+  const int n = static_cast<int>(spec.joints.size() + spec.loop_joints.size());
+  names.reset(n);
+  const auto name_of = [&](int k) -> const auto& { return joint_of(spec, k, none).name; };
+  for (int i = 0; i < n; ++i)
+    if (!names.insert(i, name_of))
+      throw InputError("joint '" + name_of(i) + "'" + where +
                        ": the name is used twice; rename one of them");
   return names;
 }
@@ -55,7 +57,8 @@ bool acts(const JointSpec& joint) {
 /// By link: has it mass, or has anything that hangs on it?
 std::vector<char> links_that_carry(const MachineGraph& graph) {
   std::vector<std::vector<int>> parents(graph.n_links());
-  for (const auto& joint : graph.joints) parents[joint.child].push_back(joint.parent);
+  for (const auto& joint : graph.joints)
+    if (!joint.closes) parents[joint.child].push_back(joint.parent);
   std::vector<char> carries(graph.n_links(), 0);
   std::vector<int> waiting;
   const auto mark = [&](int link) {
@@ -75,18 +78,19 @@ std::vector<char> links_that_carry(const MachineGraph& graph) {
 /// The link that no joint has as child; the first of them, or the first of all.
 int root_link(const MachineGraph& graph) {
   std::vector<char> is_child(graph.n_links(), 0);
-  for (const auto& joint : graph.joints) is_child[joint.child] = 1;
+  for (const auto& joint : graph.joints)
+    if (!joint.closes) is_child[joint.child] = 1;
   const auto root = std::find(is_child.begin(), is_child.end(), 0);
   return root == is_child.end() ? 0 : static_cast<int>(root - is_child.begin());
 }
 
 void add_floating_base(Machine& machine) {
   const ModelSpec& spec = machine.spec;
-  for (const JointSpec& j : spec.joints)
-    if (j.name == spec.floating_joint)
-      throw InputError("joint '" + j.name + "'" + machine.where +
-                       ": the floating base needs this name; rename the joint");
   MachineGraph& graph = machine.graph;
+  for (int j = 0; j < graph.n_joints(); ++j)
+    if (machine.joint(j).name == spec.floating_joint)
+      throw InputError("joint '" + machine.joint(j).name + "'" + machine.where +
+                       ": the floating base needs this name; rename the joint");
   machine.floating_joint.name = spec.floating_joint;
   machine.floating_joint.type = JointType::floating;
   machine.floating_joint.child = machine.link_name(graph.ground);
@@ -96,21 +100,14 @@ void add_floating_base(Machine& machine) {
   graph.joints.push_back({graph.ground, root, joint_dof(machine.floating_joint)});
 }
 
-[[noreturn]] void refuse_loop(const Machine& machine, const std::vector<int>& loop,
-                              const JointSpec& closing) {
-  const std::string head = "joint '" + closing.name + "'" + machine.where;
-  if (closing.parent == closing.child)
-    throw InputError(head + ": link '" + closing.child +
-                     "' is its parent and its child; give it two links");
-  const size_t shown = std::min<size_t>(loop.size(), 8);
+std::string names_of(const Machine& machine, const std::vector<int>& joints) {
+  const size_t shown = std::min<size_t>(joints.size(), 8);
   std::string names;
   for (size_t i = 0; i < shown; ++i) {
-    if (i > 0) names += i + 1 < loop.size() ? ", " : " and ";
-    names += "'" + machine.joint(loop[i]).name + "'";
+    if (i > 0) names += i + 1 < joints.size() ? ", " : " and ";
+    names += "'" + machine.joint(joints[i]).name + "'";
   }
-  if (shown < loop.size()) names += " ...";
-  throw InputError(head + " closes a loop of joints " + names + " at link '" + closing.child +
-                   "'; a model is a tree: remove one of these joints");
+  return shown < joints.size() ? names + " ..." : names;
 }
 
 }  // namespace
@@ -131,42 +128,68 @@ Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::s
   MachineGraph& graph = machine.graph;
   const NameIndex names = index_joints(spec, where);
   for (const LinkSpec& link : spec.links) graph.massless.push_back(is_massless(link));
-  graph.joints.reserve(spec.joints.size() + 1);
-  for (const JointSpec& j : spec.joints) {
+  const int n_joints = static_cast<int>(spec.joints.size() + spec.loop_joints.size());
+  graph.joints.reserve(n_joints + 1);
+  for (int i = 0; i < n_joints; ++i) {
+    const JointSpec& j = machine.joint(i);
     const int parent = find_link(spec, links, j.parent, j, "parent", where);
     const int child = find_link(spec, links, j.child, j, "child", where);
-    graph.joints.push_back({parent, child, joint_dof(j), acts(j), j.type == JointType::fixed});
+    if (parent == child)
+      throw InputError("joint '" + j.name + "'" + where + ": link '" + j.child +
+                       "' is its parent and its child; give it two links");
+    const bool closes = i >= static_cast<int>(spec.joints.size());
+    graph.joints.push_back(
+        {parent, child, joint_dof(j), acts(j), !closes && j.type == JointType::fixed, closes});
   }
   if (spec.keep_fixed) {
     const std::vector<char> carries = links_that_carry(graph);
     for (auto& joint : graph.joints) joint.weld = joint.weld && !carries[joint.child];
   }
-  machine.prescribed.assign(spec.joints.size() + 1, 0);
+  machine.prescribed.assign(n_joints + 1, 0);
   for (const std::string& name : spec.prescribed) {
     const int j = names.find(
-        name, [&](int k) -> const auto& { return spec.joints[k].name; });
+        name, [&](int k) -> const auto& { return machine.joint(k).name; });
     if (j >= 0) graph.joints[j].acts = true;
     if (j >= 0 || (spec.floating_base && name == spec.floating_joint))
-      machine.prescribed[j >= 0 ? j : spec.joints.size()] = 1;
+      machine.prescribed[j >= 0 ? j : n_joints] = 1;
   }
   graph.ground = root_link(graph);
   if (spec.floating_base) add_floating_base(machine);
   return machine;
 }
 
-void require_tree(const Machine& machine, const SpanningForest& forest) {
+void check_forest(const Machine& machine, const SpanningForest& forest, const Lumps& lumps) {
   const MachineGraph& graph = machine.graph;
-  std::vector<int> root_of(graph.n_links());
-  for (int root : forest.roots) root_of[root] = root;
-  for (int j : forest.order) root_of[graph.joints[j].child] = root_of[graph.joints[j].parent];
-  for (int j : forest.loop_joints)
-    if (root_of[graph.joints[j].parent] == root_of[graph.joints[j].child])
-      refuse_loop(machine, loop_of(graph, forest, j), machine.joint(j));
+  for (int j : forest.loop_joints) {
+    const int parent = graph.joints[j].parent, child = graph.joints[j].child;
+    if (lumps.lead[parent] == lumps.lead[child])
+      throw InputError("joint '" + machine.joint(j).name + "'" + machine.where + " joins links '" +
+                       machine.link_name(parent) + "' and '" + machine.link_name(child) +
+                       "', which fixed joints make one body; remove the joint");
+    if (machine.joint(j).type == JointType::composite)
+      throw InputError("joint '" + machine.joint(j).name + "'" + machine.where +
+                       " is composite and closes a loop of joints " +
+                       names_of(machine, loop_of(graph, forest, j)) +
+                       "; let a joint of another type close it");
+  }
   if (forest.roots.size() == 1) return;
+  for (int j : forest.loop_joints)
+    if (graph.joints[j].child == forest.roots[1] && !graph.joints[j].closes)
+      throw InputError("joint '" + machine.joint(j).name + "'" + machine.where +
+                       " closes a loop of joints " + names_of(machine, loop_of(graph, forest, j)) +
+                       " that hangs on nothing; join link '" + machine.link_name(forest.roots[1]) +
+                       "' to the rest");
   const int first = graph.ground < machine.n_links() ? graph.ground : graph.joints.back().child;
   throw InputError("links '" + machine.link_name(first) + "' and '" +
                    machine.link_name(forest.roots[1]) + "'" + machine.where +
                    " both have no parent; a model has one root: join them with a joint");
+}
+
+void note_loops(const Machine& machine, const SpanningForest& forest, std::vector<Note>& notes) {
+  for (int j : forest.loop_joints)
+    notes.push_back(
+        {NoteLevel::info, machine.joint(j).name,
+         "closes a loop of joints " + names_of(machine, loop_of(machine.graph, forest, j))});
 }
 
 }  // namespace linkwise

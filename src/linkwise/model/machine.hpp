@@ -9,8 +9,8 @@
 
 namespace linkwise {
 
-/// Indices of the graph are those of the spec. A floating base adds one link, the ground, and one
-/// joint, from the ground to the root link, behind the spec's.
+/// Indices of links are those of the spec. Joints are the spec's, then its loop joints. A floating
+/// base adds one link, the ground, and one joint, from the ground to the root link, behind these.
 struct Machine {
   const ModelSpec& spec;
   std::string where;  ///< " of arm.urdf" or ""
@@ -19,9 +19,7 @@ struct Machine {
   std::vector<char> prescribed;  ///< by joint
 
   int n_links() const { return static_cast<int>(spec.links.size()); }
-  const JointSpec& joint(int j) const {
-    return j < static_cast<int>(spec.joints.size()) ? spec.joints[j] : floating_joint;
-  }
+  const JointSpec& joint(int j) const { return joint_of(spec, j, floating_joint); }
   const std::string& link_name(int l) const { return spec.links[l].name; }
 };
 
@@ -31,8 +29,11 @@ NameIndex index_links(const ModelSpec& spec, const std::string& where);
 /// Throws InputError where a joint's name is used twice or names a link that does not exist.
 Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::string& where);
 
-/// Throws InputError unless the forest is one tree without loop joints: the recursion takes no
-/// loops yet.
-void require_tree(const Machine& machine, const SpanningForest& forest);
+/// Throws InputError unless everything hangs together, and every loop joint joins two links that
+/// can move against each other.
+void check_forest(const Machine& machine, const SpanningForest& forest, const Lumps& lumps);
+
+/// What closes a loop, which joints are on it, and how the ends are told from each other.
+void note_loops(const Machine& machine, const SpanningForest& forest, std::vector<Note>& notes);
 
 }  // namespace linkwise

@@ -4,6 +4,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/model/hinge_frames.hpp"
+#include "linkwise/model/place_loops.hpp"
 #include "linkwise/model/undetermined.hpp"
 #include "linkwise/model/validate.hpp"
 
@@ -33,8 +34,8 @@ Model::Model(ModelSpec given) : spec_(std::move(given)) {
   link_by_name_ = index_links(spec_, where());
   const Machine machine = make_machine(spec_, link_by_name_, where());
   const SpanningForest forest = make_spanning_forest(machine.graph);
-  require_tree(machine, forest);
   const Lumps lumps = make_lumps(machine.graph, forest);
+  check_forest(machine, forest, lumps);
   const LumpedInertia lumped = lump_inertia(machine, lumps, notes);
   const BodyTree tree = stack_massless(machine.graph, forest, lumps);
   PlacedJoints placed = place_joints(machine, lumps, lumped, tree);
@@ -42,6 +43,8 @@ Model::Model(ModelSpec given) : spec_(std::move(given)) {
   undetermined_ = find_undetermined(machine, lumps, lumped, notes);
   choose_hinge_frames(bodies, placed);
   links = place_links(machine, lumps, lumped, placed);
+  loops = place_loops(machine, forest, placed.joints, links);
+  note_loops(machine, forest, notes);
 
   notes.insert(notes.end(), spec_.notes.begin(), spec_.notes.end());
   gravity = spec_.gravity;
@@ -80,6 +83,12 @@ int Model::joint_index(const std::string& name) const {
                  "keep_fixed (keep_fixed = true in a scenario)"));
   std::vector<std::string> known;
   for (const auto& j : joints) known.push_back(j.name);
+  for (const auto& loop : loops.joints) {
+    if (loop.joint.name == name)
+      throw InputError("joint '" + name + "'" + where() +
+                       " closes a loop: its motion follows from that of the other joints");
+    known.push_back(loop.joint.name);
+  }
   throw InputError("joint '" + name + "' does not exist in model '" + spec_.name + "'" + where() +
                    suggest(name, known));
 }
@@ -138,11 +147,6 @@ std::string Model::lined_up(int body) const {
          instead;
 }
 
-const JointSpec& Model::joint_spec(int joint) const {
-  const size_t i = static_cast<size_t>(joints[joint].spec);
-  return i < spec_.joints.size() ? spec_.joints[i] : floating_joint_;
-}
-
 std::vector<int> Model::joint_parents() const {
   std::vector<int> parents;
   parents.reserve(joints.size());
@@ -156,6 +160,13 @@ std::vector<int> Model::joint_parents() const {
     parents.push_back(before < 0 ? -1 : elements[before].joint);
   }
   return parents;
+}
+
+void refuse_loops(const Model& model, const std::string& who) {
+  if (model.n_loops() == 0) return;
+  throw InputError("model '" + model.spec().name + "'" + model.where() + ": joint '" +
+                   model.loops.joints.front().joint.name + "' closes a loop, and " + who +
+                   " takes none; remove a joint of the loop");
 }
 
 }  // namespace linkwise

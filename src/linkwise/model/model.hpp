@@ -78,9 +78,27 @@ struct JointInfo {
   int first_element = 0, n_elements = 0;
   int q = 0, nq = 0, v = 0, nv = 0;
   int link;                   ///< child link (index into links)
-  int spec = -1;              ///< index in the spec's joints; one past the end: the floating base's
+  int spec = -1;              ///< as of joint_of; the last one is the floating base's
   Transform<double> to_user;  ///< last element's frame -> the user's joint frame
   bool last_of_body = true;   ///< its frame is the body's frame
+};
+
+/// A joint that closes a loop of the tree. Its coordinates follow from those of the tree: it stands
+/// where the frame F of its child and what its elements make of the frame E of its parent meet.
+struct LoopJoint {
+  JointInfo joint;       ///< its body is the child's, -1: ground; q, v, elements as in LoopJoints
+  int parent_body = -1;  ///< -1: ground
+  int parent_link = 0;
+  Transform<double> on_parent;  ///< parent's body frame -> E, the joint's axes as given
+  Transform<double> on_child;   ///< child's body frame -> F, which is the last element's frame
+};
+
+/// All of them. Their coordinates, rates and properties are counted apart from the tree's.
+struct LoopJoints {
+  std::vector<LoopJoint> joints;
+  std::vector<Element> elements;  ///< the first one of a joint is placed in E
+  std::array<std::vector<double>, n_dof_properties> dof;
+  int nq = 0, nv = 0;
 };
 
 /// Where a link of the file is: on which joint's frame (-1: ground), and how it is placed there.
@@ -99,7 +117,9 @@ class Model {
   int nq() const { return nq_; }
   int nv() const { return nv_; }
   int n_bodies() const { return static_cast<int>(topology.size()); }
+  /// Of the tree.
   int n_joints() const { return static_cast<int>(joints.size()); }
+  int n_loops() const { return static_cast<int>(loops.joints.size()); }
   double total_mass() const { return total_mass_; }
   /// Index of a joint or throws InputError with the nearest names.
   int joint_index(const std::string& name) const;
@@ -120,7 +140,10 @@ class Model {
   /// remedy. Otherwise "".
   std::string lined_up(int body) const;
   /// What the user said about a joint, axes normalised.
-  const JointSpec& joint_spec(int joint) const;
+  const JointSpec& joint_spec(int joint) const { return spec_of(joints[joint]); }
+  const JointSpec& spec_of(const JointInfo& joint) const {
+    return joint_of(spec_, joint.spec, floating_joint_);
+  }
   /// Index of the joint inboard of each joint, -1 at the ground.
   std::vector<int> joint_parents() const;
 
@@ -131,6 +154,7 @@ class Model {
   std::vector<KindRange> kind_ranges;
   std::vector<JointInfo> joints;
   std::vector<LinkInfo> links;
+  LoopJoints loops;
   std::vector<Note> notes;
   /// One array of length nv for each property of dof_property_table.
   std::array<std::vector<double>, n_dof_properties> dof;
@@ -150,6 +174,9 @@ class Model {
   std::string undetermined_;
   NameIndex joint_by_name_, link_by_name_;
 };
+
+/// Throws InputError where the model has loops: `who` takes none.
+void refuse_loops(const Model& model, const std::string& who);
 
 /// The bodies of a range, whose kind is known while compiling.
 template <class B>

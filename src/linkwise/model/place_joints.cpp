@@ -21,42 +21,33 @@ Mat3<double> align_z(Vec3<double> a) {
   return R;
 }
 
-/// Appends the elements of joint i, `to_joint` leading from the frame of the element before to the
-/// joint's own axes at zero.
-void append_elements(const Machine& machine, int spec_joint, int i, Xform to_joint,
-                     PlacedJoints& out) {
-  const JointSpec& s = machine.joint(spec_joint);
-  JointInfo& info = out.joints[i];
-  info.to_user = {Mat3<double>::identity(), {}};
-  info.first_element = static_cast<int>(out.elements.size());
-  info.n_elements = n_joint_elements(s);
-  Element e;
-  e.q = info.q;
-  e.v = info.v;
-  e.joint = i;
-  e.prescribed = machine.prescribed[spec_joint];
+}  // namespace
+
+Xform append_elements(const JointSpec& joint, Element e, Xform to_joint,
+                      std::vector<Element>& elements) {
+  Xform to_user{Mat3<double>::identity(), {}};
   const auto push = [&](ElementKind kind, const Mat3<double>& A, double pitch) {
     e.kind = kind;
     e.nq = info_of(kind).nq;
     e.nv = info_of(kind).nv;
     e.pitch = pitch;
     e.placement = Xform{transpose(A), {}} * to_joint;
-    out.elements.push_back(e);
+    elements.push_back(e);
     e.q += e.nq;
     e.v += e.nv;
     // The next element starts from this frame, turned back to the user's axes.
-    to_joint = info.to_user = Xform{A, {}};
+    to_joint = to_user = Xform{A, {}};
   };
-  for (int k = 0; k < info.n_elements; ++k) {
-    const auto [kind, axis] = joint_element(s, k);
+  for (int k = 0; k < n_joint_elements(joint); ++k) {
+    const auto [kind, axis] = joint_element(joint, k);
     if (axis < 0)
       push(kind, Mat3<double>::identity(), 0);
     else
-      push(kind, align_z(s.axes[axis].axis), kind == ElementKind::helical ? s.axes[axis].pitch : 0);
+      push(kind, align_z(joint.axes[axis].axis),
+           kind == ElementKind::helical ? joint.axes[axis].pitch : 0);
   }
+  return to_user;
 }
-
-}  // namespace
 
 PlacedJoints place_joints(const Machine& machine, const Lumps& lumps, const LumpedInertia& lumped,
                           const BodyTree& tree) {
@@ -90,7 +81,15 @@ PlacedJoints place_joints(const Machine& machine, const Lumps& lumps, const Lump
     Xform to_joint = Xform{transpose(s.rotation), s.translation} * lumped.from_lead[parent];
     if (const int before = joint_of[lumps.lead[parent]]; before >= 0)
       to_joint = to_joint * out.joints[before].to_user;
-    append_elements(machine, j, i, to_joint, out);
+    JointInfo& info = out.joints[i];
+    info.first_element = static_cast<int>(out.elements.size());
+    info.n_elements = n_joint_elements(s);
+    Element first;
+    first.q = info.q;
+    first.v = info.v;
+    first.joint = i;
+    first.prescribed = machine.prescribed[j];
+    info.to_user = append_elements(s, first, to_joint, out.elements);
   }
   return out;
 }

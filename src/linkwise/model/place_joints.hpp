@@ -19,6 +19,12 @@ struct PlacedJoints {
 PlacedJoints place_joints(const Machine& machine, const Lumps& lumps, const LumpedInertia& lumped,
                           const BodyTree& tree);
 
+/// The elements of a joint, the first one like `first` but for what it is and where: `to_joint`
+/// leads from the frame before it to the joint's own axes at zero. Returns last element's frame ->
+/// the joint's axes there, a turn.
+Transform<double> append_elements(const JointSpec& joint, Element first, Transform<double> to_joint,
+                                  std::vector<Element>& elements);
+
 /// Where every link of the spec is: on the joint that moves its lump, or on the ground.
 std::vector<LinkInfo> place_links(const Machine& machine, const Lumps& lumps,
                                   const LumpedInertia& lumped, const PlacedJoints& placed);

@@ -12,10 +12,15 @@
 namespace linkwise {
 namespace {
 
-constexpr char magic[] = "linkwise-model-1";
+// Machines without loops are described as they always were, where what is as usual may be left out
+// at the end. Others are described in full, so that bytes cut short are no other machine.
+constexpr char magic[] = "linkwise-model-1", magic_in_full[] = "linkwise-model-2";
 
 struct Writer {
-  std::string bytes = magic;
+  std::string bytes;
+  bool in_full;
+
+  explicit Writer(bool full) : bytes(full ? magic_in_full : magic), in_full(full) {}
 
   void raw(const void* data, size_t n) { bytes.append(static_cast<const char*>(data), n); }
   template <class E>
@@ -27,12 +32,15 @@ struct Writer {
     const std::uint64_t n = values.size();
     raw(&n, sizeof(n));
   }
-  bool goes_on(bool more) const { return more; }
+  bool goes_on(bool more) const { return more || in_full; }
 };
 
 struct Reader {
   const std::string& bytes;
-  size_t at = 0;
+  bool in_full;
+  size_t at = sizeof(magic) - 1;
+
+  Reader(const std::string& given, bool full) : bytes(given), in_full(full) {}
 
   [[noreturn]] static void fail(const char* what) {
     throw InputError(std::string("model data is ") + what +
@@ -60,7 +68,7 @@ struct Reader {
     if (n > bytes.size() - at) fail("cut short");
     values.resize(n);
   }
-  bool goes_on(bool) const { return at < bytes.size(); }
+  bool goes_on(bool) const { return in_full || at < bytes.size(); }
 };
 
 template <class A, class Text>
@@ -133,22 +141,32 @@ void spec_fields(A& archive, Spec& spec) {
     archive.size(l.parameters);
     archive.raw(l.parameters.data(), l.parameters.size() * sizeof(double));
   }
+  if (!archive.in_full) return;
+  archive.size(spec.loop_joints);
+  for (auto& loop : spec.loop_joints) {
+    joint_fields(archive, loop.joint);
+    archive.size(loop.joint.initial);
+    archive.raw(loop.joint.initial.data(), loop.joint.initial.size() * sizeof(double));
+    archive.raw(loop.child_rotation.m, sizeof(loop.child_rotation.m));
+    archive.raw(&loop.child_translation.x, 3 * sizeof(double));
+  }
 }
 
 }  // namespace
 
 std::string serialize(const ModelSpec& spec) {
-  Writer writer;
+  Writer writer(!spec.loop_joints.empty());
   spec_fields(writer, spec);
   return std::move(writer.bytes);
 }
 
 ModelSpec deserialize(const std::string& bytes) {
-  if (!bytes.starts_with(magic))
+  const bool in_full = bytes.starts_with(magic_in_full);
+  if (!in_full && !bytes.starts_with(magic))
     throw InputError(
         "model data was not written by this version of linkwise; build the model again from its "
         "source");
-  Reader reader{bytes, sizeof(magic) - 1};
+  Reader reader(bytes, in_full);
   ModelSpec spec;
   spec_fields(reader, spec);
   if (reader.at != bytes.size()) Reader::fail("damaged");

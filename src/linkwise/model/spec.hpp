@@ -108,6 +108,15 @@ struct JointSpec {
   std::vector<double> initial;  ///< coordinates where it starts; empty: the zero position
 };
 
+/// A joint that closes a loop, whatever else its links hang on: its point and axes are given on
+/// both links. `joint` places them on the parent.
+struct LoopJointSpec {
+  JointSpec joint;
+  Mat3<double> child_rotation =
+      Mat3<double>::identity();    ///< joint axes in the child link frame (columns)
+  Vec3<double> child_translation;  ///< joint point in the child link frame, m
+};
+
 enum class NoteLevel { merge, warning, info };
 const char* note_level_name(NoteLevel level);
 NoteLevel note_level_from_name(const std::string& name);
@@ -126,8 +135,16 @@ struct ModelSpec {
   std::vector<std::string> prescribed;  ///< joints whose motion is given; see Model
   std::vector<LinkSpec> links;
   std::vector<JointSpec> joints;
+  std::vector<LoopJointSpec> loop_joints;
   std::vector<Note> notes;  ///< of whoever read the model from a file
 };
+
+/// Joint j of a spec whose loop joints stand behind the others, and what stands behind them all.
+inline const JointSpec& joint_of(const ModelSpec& spec, int j, const JointSpec& last) {
+  const auto n = static_cast<int>(spec.joints.size()),
+             n_loops = static_cast<int>(spec.loop_joints.size());
+  return j < n ? spec.joints[j] : j < n + n_loops ? spec.loop_joints[j - n].joint : last;
+}
 
 /// " of arm.urdf" or "": the tail of messages about an element of this machine.
 inline std::string source_of(const ModelSpec& spec) {

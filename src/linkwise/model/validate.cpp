@@ -109,6 +109,13 @@ void validate(ModelSpec& spec, std::vector<Note>& notes) {
                      ": gravity is not finite; give three finite numbers in m/s2");
   for (const LinkSpec& link : spec.links) validate_link(link, where, notes);
   for (JointSpec& joint : spec.joints) validate_joint(joint, where);
+  for (LoopJointSpec& loop : spec.loop_joints) {
+    validate_joint(loop.joint, where);
+    const std::string head = "joint '" + loop.joint.name + "'" + where + ": ";
+    if (!finite(loop.child_translation))
+      throw InputError(head + "child_translation is not finite; give three finite numbers in m");
+    require_rotation(loop.child_rotation, head + "child_rotation");
+  }
 }
 
 void validate_link(const LinkSpec& link, const std::string& where, std::vector<Note>& notes) {

@@ -18,6 +18,10 @@ ModelSpec full_spec() {
   spec.keep_fixed = true;
   spec.prescribed = {"joint1"};
   spec.notes = {{NoteLevel::info, "lamp", "not read"}};
+  spec.links.push_back(random_link("tip", draws));
+  spec.joints.push_back(random_joint(JointType::revolute, "j", "base", "tip", draws));
+  spec.loop_joints = {{random_joint(JointType::universal, "loop", "link1", "tip", draws),
+                       random_rotation(draws), random_vector3(draws)}};
   spec.joints[0].dof = {{DofProperty::lower, {-infinity, -1, 0}}, {DofProperty::armature, {0.5}}};
   return spec;
 }
@@ -37,6 +41,10 @@ TEST(Serialize, ComesBackAsItWas) {
   EXPECT_EQ(back.joints[0].dof[0].values, spec.joints[0].dof[0].values);
   EXPECT_EQ(back.joints[1].rotation.m[5], spec.joints[1].rotation.m[5]);
   EXPECT_EQ(back.links[2].inertia.m[4], spec.links[2].inertia.m[4]);
+  ASSERT_EQ(back.loop_joints.size(), 1u);
+  EXPECT_EQ(back.loop_joints[0].joint.child, "tip");
+  EXPECT_EQ(back.loop_joints[0].child_rotation.m[7], spec.loop_joints[0].child_rotation.m[7]);
+  EXPECT_EQ(back.loop_joints[0].child_translation.z, spec.loop_joints[0].child_translation.z);
 }
 
 TEST(Serialize, CutShortAnywhereIsAnInputError) {

@@ -127,17 +127,23 @@ const Wrong wrong_joints[] = {
      "joint 'shoulder' of arm.urdf: parent link 'bass' does not exist; did you mean 'base'?"},
     {"unknown_child", [](ModelSpec& s) { s.joints[1].child = "gripper"; },
      "joint 'elbow' of arm.urdf: child link 'gripper' does not exist; known: base, upper, lower"},
-    {"two_parents",
-     [](ModelSpec& s) { s.joints.push_back(joint("extra", JointType::revolute, "base", "lower")); },
-     "joint 'elbow' of arm.urdf closes a loop of joints 'shoulder', 'elbow' and 'extra' at link "
-     "'lower'; a model is a tree: remove one of these joints"},
+    {"loop_of_welds",
+     [](ModelSpec& s) {
+       for (const char* child : {"upper", "lower"})
+         s.joints.push_back(joint(std::string("extra_") + child, JointType::fixed, "base", child));
+     },
+     "joint 'shoulder' of arm.urdf joins links 'base' and 'upper', which fixed joints make one "
+     "body; remove the joint"},
+    {"composite_loop",
+     [](ModelSpec& s) {
+       s.joints.push_back(joint("extra", JointType::composite, "base", "lower"));
+       s.joints.back().axes.assign(4, {});
+     },
+     "joint 'extra' of arm.urdf is composite and closes a loop of joints 'extra', 'elbow' and "
+     "'shoulder'; let a joint of another type close it"},
     {"two_roots", [](ModelSpec& s) { s.joints.pop_back(); },
      "links 'base' and 'lower' of arm.urdf both have no parent; a model has one root: join them "
      "with a joint"},
-    {"no_root",
-     [](ModelSpec& s) { s.joints.push_back(joint("back", JointType::fixed, "lower", "base")); },
-     "joint 'back' of arm.urdf closes a loop of joints 'shoulder', 'elbow' and 'back' at link "
-     "'base'; a model is a tree: remove one of these joints"},
     {"cycle_apart",
      [](ModelSpec& s) {
        s.links.push_back(body("left"));
@@ -145,8 +151,8 @@ const Wrong wrong_joints[] = {
        s.joints.push_back(joint("there", JointType::revolute, "left", "right"));
        s.joints.push_back(joint("back", JointType::revolute, "right", "left"));
      },
-     "joint 'back' of arm.urdf closes a loop of joints 'there' and 'back' at link 'left'; a model "
-     "is a tree: remove one of these joints"},
+     "joint 'back' of arm.urdf closes a loop of joints 'there' and 'back' that hangs on nothing; "
+     "join link 'left' to the rest"},
     {"own_child", [](ModelSpec& s) { s.joints[1].parent = "lower"; },
      "joint 'elbow' of arm.urdf: link 'lower' is its parent and its child; give it two links"},
     {"floating_name_taken",
