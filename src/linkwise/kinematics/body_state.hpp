@@ -5,6 +5,7 @@
 //     p_n = v_n x* (M_n v_n) - external
 // A stack of elements is walked as if its frames were massless bodies, which gives c_n and the
 // columns of P_n in the body's frame without ever forming dP/dt [featherstone2008, ch. 4].
+#include <span>
 #include <utility>
 
 #include "linkwise/kinematics/sweep_input.hpp"
@@ -137,15 +138,15 @@ inline bool is_free(const Model& model, const BodyTopology& body) {
   return body.n_elements == 1 && e.kind == ElementKind::floating && !e.prescribed;
 }
 
+/// Walks a stack of elements outward from a frame that moves by v_parent.
 template <class S>
-void calc_general_state(const Model& model, const BodyTopology& body, const SweepInput<S>& in,
+void calc_general_state(std::span<const Element> stack, const SweepInput<S>& in,
                         const Motion<S>& v_parent, BodyState<S>& state, GeneralState<S>& general) {
   Motion<S> v = v_parent, c{};
   general.n = 0;
-  for (int i = 0; i < body.n_elements; ++i) {
-    const Element& e = model.elements[body.first_element + i];
+  for (const Element& e : stack) {
     const Transform<S> X = element_pose(e, in.q);
-    state.X = i == 0 ? X : X * state.X;
+    state.X = &e == stack.data() ? X : X * state.X;
     for (int k = 0; k < general.n; ++k) general.P[k] = X * general.P[k];
     v = X * v;
     c = X * c;
@@ -169,10 +170,19 @@ void calc_general_state(const Model& model, const BodyTopology& body, const Swee
   state.c = c;
 }
 
-/// Fills states (and general for bodies of that kind). in.v may be null: resting.
 template <class S>
-void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states,
-                      GeneralState<S>* general) {
+void calc_general_state(const Model& model, const BodyTopology& body, const SweepInput<S>& in,
+                        const Motion<S>& v_parent, BodyState<S>& state, GeneralState<S>& general) {
+  const std::span<const Element> stack(model.elements.data() + body.first_element,
+                                       static_cast<size_t>(body.n_elements));
+  calc_general_state(stack, in, v_parent, state, general);
+}
+
+/// Fills states (and general for bodies of that kind) of the bodies in some ranges, whose parents
+/// are among them. in.v may be null: resting.
+template <class S>
+void calc_body_states(const Model& model, const std::vector<KindRange>& ranges,
+                      const SweepInput<S>& in, BodyState<S>* states, GeneralState<S>* general) {
   const auto velocity = [&](int n) -> const Motion<S>& { return states[n].v; };
   const auto step = [&](auto joint, int n, const auto& own, const Motion<S>& v_parent) {
     using J = decltype(joint);
@@ -191,7 +201,14 @@ void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>*
     }
     s.bias = momentum_bias(own, s.v);
   };
-  sweep_bodies_outward(model, model.kind_ranges, Motion<S>{}, velocity, step);
+  sweep_bodies_outward(model, ranges, Motion<S>{}, velocity, step);
+}
+
+/// The same of all bodies, and external wrenches.
+template <class S>
+void calc_body_states(const Model& model, const SweepInput<S>& in, BodyState<S>* states,
+                      GeneralState<S>* general) {
+  calc_body_states(model, model.kind_ranges, in, states, general);
   for_external_wrenches(model, in, [&](int n, const Force<S>& w) { states[n].bias -= w; });
 }
 

@@ -13,6 +13,8 @@ struct SweepInput {
   const S* external = nullptr;
   /// Acceleration of prescribed degrees of freedom, [nv]; null: zero.
   const S* prescribed = nullptr;
+  /// Torques of loop joints, [nv] of theirs; null: none.
+  const S* loop_tau = nullptr;
   /// Times the model's gravity; 0 leaves it out.
   double gravity_factor = 1;
 };

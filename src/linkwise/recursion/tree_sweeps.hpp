@@ -5,11 +5,13 @@
 // what is contributed to them.
 #include <algorithm>
 #include <atomic>
+#include <span>
 #include <vector>
 
 #include "linkwise/kinematics/body_state.hpp"
 #include "linkwise/kinematics/placement.hpp"
 #include "linkwise/kinematics/user_frames.hpp"
+#include "linkwise/recursion/loop_steps.hpp"
 #include "linkwise/recursion/stack_steps.hpp"
 #include "linkwise/recursion/steps.hpp"
 
@@ -116,6 +118,8 @@ class TreeSweeps {
     for_external_wrenches(model_, in, [&](int n, const Force<S>& w) { body_[n].sum.p -= w; });
   }
 
+  void add_wrench(int n, const Force<S>& w) { body_[n].sum.p -= w; }
+
   // Whether loads are wanted is asked while sweeping: two instantiations would be contracted to
   // fused multiply-adds in two ways, and recording loads would change the motion's last bits.
 
@@ -192,6 +196,48 @@ class TreeSweeps {
     sweep_outward(model_, ranges, ground, acceleration_of, step);
   }
 
+  /// Forces of loops on body n, whose joint is eliminated, carried across that joint. Returns how
+  /// many columns the joint has.
+  int carry_loops(const SweepInput<S>& in, int n, std::span<LoopColumn<S>> columns) const {
+    int count = 0;
+    with_joint(n, [&](auto joint, const BodyTopology& at) {
+      using J = decltype(joint);
+      const Body& b = body_[n];
+      const double pitch = model_.constants[n].pitch;
+      for (LoopColumn<S>& column : columns) {
+        if constexpr (is_general<J>) {
+          const Stack& own = stack_[at.general];
+          count = own.is_free ? carry(own.free, column)
+                              : carry(general_[at.general], own.columns, own.c, column);
+        } else {
+          const Motion<S> c = J::bias(b.velocity, pitch, in.v ? in.v[at.v] : S{});
+          count = carry<J>(b.axis, c, pitch, column);
+        }
+        column.at_parent = place<J>(n).to_parent(column.F);
+      }
+    });
+    return count;
+  }
+
+  /// The same forces, now known.
+  void apply_loops(int n, std::span<const LoopColumn<S>> columns, const S* f, bool with_loads) {
+    with_joint(n, [&](auto joint, const BodyTopology& at) {
+      for (size_t i = 0; i < columns.size(); ++i) {
+        if constexpr (is_general<decltype(joint)>) {
+          Stack& own = stack_[at.general];
+          if (own.is_free)
+            apply(columns[i], f[i], own.free);
+          else
+            apply(columns[i], f[i], general_[at.general].n, own.columns);
+        } else {
+          apply(columns[i], f[i], body_[n].axis);
+        }
+        const Force<S>& F = columns[i].F;
+        if (with_loads) reduced_[n].p -= Force<S>{f[i] * F.lin, f[i] * F.ang};
+      }
+    });
+  }
+
   void store_loads(const S* q, S* loads) const {
     store_joint_loads(
         model_, q, [&](int n) -> const Force<S>& { return reduced_[n].joint_load; }, loads);
@@ -243,6 +289,14 @@ class TreeSweeps {
     Contribution<S>* sum = nullptr;
     bool opens = false;  ///< sets sum->Y instead of adding to it
   };
+
+  /// f(joint, body n's place in the tree).
+  template <class F>
+  void with_joint(int n, F&& f) const {
+    const BodyTopology& at = model_.topology[n];
+    dispatch_kind_range({at.joint_kind, at.body_kind, n, n + 1},
+                        [&](auto joint, int, int) { f(joint, at); });
+  }
 
   template <class J>
   LW_INLINE auto place(int n) const {

@@ -1,0 +1,304 @@
+#include "linkwise/dynamics/articulated_loops.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace linkwise {
+namespace {
+
+/// Pivots of the scaled Lambda below this are zero: rounding errors leave 1e-16.
+constexpr double null_pivot = 1e-12;
+
+/// Part of a list of ranges: bodies [begin, end).
+std::vector<KindRange> part_of(const std::vector<KindRange>& all, int begin, int end) {
+  std::vector<KindRange> part;
+  for (KindRange range : all) {
+    range.begin = std::max(range.begin, begin);
+    range.end = std::min(range.end, end);
+    if (range.begin < range.end) part.push_back(range);
+  }
+  return part;
+}
+
+/// What a body yields to a wrench, all else left free. Where its inertia is singular it is given
+/// some: D only weighs forces that constraints leave open.
+Compliance<double> yielding(const Model& model, int body, const Transform<double>& X) {
+  if (body < 0) return {};
+  Inertia<double> M = with_body(
+      model, body, [](const auto& own) -> Inertia<double> { return frozen_inertia(own); });
+  ArticulatedInertia<double> Y;
+  add_inertia(Y, M);
+  double L[21];
+  if (!linkwise::factor(Y, L, 1e-10)) {
+    const double lever = dot(X.r, X.r), own = M.I.m[0] + M.I.m[2] + M.I.m[5];
+    if (!(M.m > 0)) M.m = model.total_mass();
+    const double more = 0.1 * own + M.m * (lever > 0 ? lever : own > 0 ? 0 : 1);
+    for (const int i : {0, 2, 5}) M.I.m[i] += more;
+  }
+  return invert_inertia(M);
+}
+
+Force<double> direction(const Vector6<double>& Q) { return to_force(Q.data()); }
+
+}  // namespace
+
+ArticulatedLoops::ArticulatedLoops(const Model& model)
+    : model_(model), sweeps_(model), states_(model), groups_(make_loop_groups(model)) {
+  work_.resize(groups_.size());
+  for (size_t g = 0; g < groups_.size(); ++g) {
+    const size_t rows = groups_[g].rows;
+    Work& w = work_[g];
+    w.columns.resize(groups_[g].columns);
+    w.Psi.resize(rows);
+    w.metric.resize(groups_[g].members.size());
+    w.Lambda.resize(rows * rows);
+    w.scaled.resize(rows * rows);
+    for (auto* x : {&w.beta, &w.r, &w.size, &w.f, &w.rhs}) x->resize(rows);
+  }
+  int end = model.n_bodies();
+  for (int g = 0; g < static_cast<int>(groups_.size());) {
+    int last = g;
+    while (last < static_cast<int>(groups_.size()) && groups_[last].top == groups_[g].top) ++last;
+    const int begin = groups_[g].top + 1;
+    stages_.push_back({part_of(model.kind_ranges, begin, end), g, last});
+    end = begin;
+    g = last;
+  }
+  const int n_groups = static_cast<int>(groups_.size());
+  if (end > 0) stages_.push_back({part_of(model.kind_ranges, 0, end), n_groups, n_groups});
+  for (const LoopJoint& loop : model.loops.joints) {
+    compliance_a_.push_back(yielding(model, loop.parent_body, loop.on_parent));
+    compliance_b_.push_back(yielding(model, loop.joint.body, loop.on_child));
+  }
+}
+
+bool ArticulatedLoops::evaluate(const SweepInput<double>& in, double* du, double* loads) {
+  const bool with_loads = loads != nullptr;
+  report_ = {};
+  states_.update(in);
+  sweeps_.start(with_loads);
+  sweeps_.calc_velocities(in, model_.kind_ranges);
+  sweeps_.add_external(in);
+  add_known_wrenches(in);
+  for (const Stage& stage : stages_) {
+    sweeps_.eliminate_joints(in, stage.ranges, with_loads);
+    if (failed_body() >= 0) return false;
+    for (int g = stage.first_group; g < stage.last_group; ++g) {
+      carry(in, g);
+      factor(g);
+      if (groups_[g].top >= 0) reduce_top(g);
+    }
+  }
+  for (size_t i = stages_.size(); i-- > 0;) {
+    for (int g = stages_[i].first_group; g < stages_[i].last_group; ++g)
+      solve_forces(in, g, with_loads);
+    sweeps_.accelerate_bodies(in, stages_[i].ranges, du, with_loads);
+  }
+  if (!loads) return true;
+  sweeps_.store_loads(in.q, loads);
+  store_loop_loads(in, loads + 6 * model_.n_joints());
+  return true;
+}
+
+/// Unit forces where they act: on the bodies that the joint joins, or on the top.
+void ArticulatedLoops::place_forces(int g) {
+  Work& w = work_[g];
+  for (auto& column : w.columns) column.F = {};
+  std::fill(w.Psi.begin(), w.Psi.end(), Force<double>{});
+  for (const auto& member : groups_[g].members) {
+    const LoopState& loop = states_[member.loop];
+    for (int i = 0; i < member.n_rows; ++i) {
+      const Force<double> Q = direction(loop.basis.Q[i]);
+      const auto add = [&](int at, const Force<double>& wrench) {
+        (at >= 0 ? w.columns[at + i].F : w.Psi[-1 - at + i]) += wrench;
+      };
+      add(member.on_a, wrench_on_a(loop, Q));
+      add(member.on_b, wrench_on_b(model_.loops.joints[member.loop], Q));
+      w.r[member.row + i] = dot(loop.c, Q);
+      w.size[member.row + i] = std::abs(w.r[member.row + i]);
+    }
+  }
+}
+
+void ArticulatedLoops::carry(const SweepInput<double>& in, int g) {
+  const LoopGroup& group = groups_[g];
+  Work& w = work_[g];
+  const int n = group.rows;
+  place_forces(g);
+  std::fill(w.Lambda.begin(), w.Lambda.end(), 0.0);
+  std::fill(w.beta.begin(), w.beta.end(), 0.0);
+  for (const auto& carrier : group.carriers) {
+    const int count = static_cast<int>(carrier.rows.size());
+    const std::span columns(w.columns.data() + carrier.first, static_cast<size_t>(count));
+    const int dof = sweeps_.carry_loops(in, carrier.body, columns);
+    for (int i = 0; i < count; ++i) {
+      double* const row = &w.Lambda[static_cast<size_t>(carrier.rows[i]) * n];
+      for (int j = 0; j <= i; ++j)
+        for (int k = 0; k < dof; ++k) row[carrier.rows[j]] += columns[i].z[k] * columns[j].y[k];
+      w.beta[carrier.rows[i]] += columns[i].beta;
+      w.size[carrier.rows[i]] += std::abs(columns[i].beta);
+      const int to = carrier.to[i];
+      (to >= 0 ? w.columns[to].F : w.Psi[-1 - to]) += columns[i].at_parent;
+    }
+  }
+}
+
+/// Lambda in coordinates in which D is 1, factored.
+void ArticulatedLoops::factor(int g) {
+  const LoopGroup& group = groups_[g];
+  Work& w = work_[g];
+  const int n = group.rows;
+  for (size_t m = 0; m < group.members.size(); ++m) {
+    const auto& member = group.members[m];
+    const LoopState& loop = states_[member.loop];
+    Force<double> on_a[6], on_b[6];
+    for (int i = 0; i < member.n_rows; ++i) {
+      const Force<double> Q = direction(loop.basis.Q[i]);
+      on_a[i] = wrench_on_a(loop, Q);
+      on_b[i] = wrench_on_b(model_.loops.joints[member.loop], Q);
+      const Motion<double> a = compliance_a_[member.loop] * on_a[i],
+                           b = compliance_b_[member.loop] * on_b[i];
+      for (int j = 0; j <= i; ++j) w.metric[m][packed(i, j)] = dot(a, on_a[j]) + dot(b, on_b[j]);
+    }
+    cholesky_factor(member.n_rows, w.metric[m].data(), 0.0);
+  }
+  // L^-1 Lambda L^-T, D = L L^T by blocks: rows, then columns of the lower triangle.
+  w.scaled = w.Lambda;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < i; ++j)
+      w.scaled[static_cast<size_t>(j) * n + i] = w.scaled[static_cast<size_t>(i) * n + j];
+  for (size_t m = 0; m < group.members.size(); ++m) {
+    const auto& member = group.members[m];
+    const double* L = w.metric[m].data();
+    double* const first = &w.scaled[static_cast<size_t>(member.row) * n];
+    for (int i = 0; i < member.n_rows; ++i) {
+      double* const row = first + static_cast<size_t>(i) * n;
+      for (int l = 0; l < i; ++l)
+        for (int j = 0; j < n; ++j)
+          row[j] -= L[packed(i, l)] * first[static_cast<size_t>(l) * n + j];
+      for (int j = 0; j < n; ++j) row[j] *= L[packed(i, i)];
+    }
+    for (int j = 0; j < n; ++j) {
+      double* const x = &w.scaled[static_cast<size_t>(j) * n + member.row];
+      for (int i = 0; i < member.n_rows; ++i) {
+        for (int l = 0; l < i; ++l) x[i] -= L[packed(i, l)] * x[l];
+        x[i] *= L[packed(i, i)];
+      }
+    }
+  }
+  w.factor.factor(n, w.scaled.data(), null_pivot);
+  report_.rows += n;
+  report_.rank += w.factor.rank();
+  report_.smallest_pivot = std::min(report_.smallest_pivot, w.factor.smallest_pivot());
+}
+
+/// x <- Lambda^+ x. Returns by how much the constraints contradict each other, where D is 1.
+double ArticulatedLoops::solve(int g, std::vector<double>& x) {
+  Work& w = work_[g];
+  const auto& members = groups_[g].members;
+  for (size_t m = 0; m < members.size(); ++m) {
+    const double* L = w.metric[m].data();
+    double* const own = &x[members[m].row];
+    for (int i = 0; i < members[m].n_rows; ++i) {
+      for (int l = 0; l < i; ++l) own[i] -= L[packed(i, l)] * own[l];
+      own[i] *= L[packed(i, i)];
+    }
+  }
+  const double missed = w.factor.solve(x.data(), x.data());
+  for (size_t m = 0; m < members.size(); ++m) {
+    const double* L = w.metric[m].data();
+    double* const own = &x[members[m].row];
+    for (int i = members[m].n_rows - 1; i >= 0; --i) {
+      for (int l = i + 1; l < members[m].n_rows; ++l) own[i] -= L[packed(l, i)] * own[l];
+      own[i] *= L[packed(i, i)];
+    }
+  }
+  return missed;
+}
+
+/// What the group leaves on its top.
+void ArticulatedLoops::reduce_top(int g) {
+  Work& w = work_[g];
+  const int n = groups_[g].rows;
+  Contribution<double> more{};
+  for (int j = 0; j < 6; ++j) {
+    for (int i = 0; i < n; ++i) w.rhs[i] = to_array(w.Psi[i])[j];
+    solve(g, w.rhs);
+    for (int r = j; r < 6; ++r) {
+      double sum = 0;
+      for (int i = 0; i < n; ++i) sum += to_array(w.Psi[i])[r] * w.rhs[i];
+      entry(more.Y, r, j) = sum;
+    }
+  }
+  for (int i = 0; i < n; ++i) w.rhs[i] = w.r[i] - w.beta[i];
+  solve(g, w.rhs);
+  for (int i = 0; i < n; ++i)
+    more.p -= Force<double>{w.rhs[i] * w.Psi[i].lin, w.rhs[i] * w.Psi[i].ang};
+  sweeps_.receive(groups_[g].top, more);
+}
+
+/// f from the acceleration of the top, and what it does to the joints on the paths.
+void ArticulatedLoops::solve_forces(const SweepInput<double>& in, int g, bool with_loads) {
+  const LoopGroup& group = groups_[g];
+  Work& w = work_[g];
+  const Motion<double> a = group.top >= 0 ? sweeps_.acceleration(group.top)
+                                          : ground_acceleration<double>(model_, in.gravity_factor);
+  double asked = 0;
+  for (size_t m = 0; m < group.members.size(); ++m)
+    for (int k = 0; k < group.members[m].n_rows; ++k) {
+      const int i = group.members[m].row + k;
+      const double at_top = dot(a, w.Psi[i]);
+      w.f[i] = w.r[i] - w.beta[i] - at_top;
+      asked = std::max(asked, (w.size[i] + std::abs(at_top)) * w.metric[m][packed(k, k)]);
+    }
+  const double missed = solve(g, w.f);
+  if (asked > 0) report_.contradiction = std::max(report_.contradiction, missed / asked);
+  std::vector<double>& own = w.rhs;
+  for (const auto& carrier : group.carriers) {
+    const size_t count = carrier.rows.size();
+    for (size_t i = 0; i < count; ++i) own[i] = w.f[carrier.rows[i]];
+    sweeps_.apply_loops(
+        carrier.body, std::span<const LoopColumn<double>>(w.columns.data() + carrier.first, count),
+        own.data(), with_loads);
+  }
+}
+
+void ArticulatedLoops::add_known_wrenches(const SweepInput<double>& in) {
+  if (!in.loop_tau) return;
+  for (int l = 0; l < model_.n_loops(); ++l) {
+    const LoopState& loop = states_[l];
+    Force<double> w;
+    for (int k = 0; k < loop.basis.n; ++k) {
+      const Force<double> dual = direction(loop.basis.dual[k]);
+      const double tau = in.loop_tau[loop.dof[k]];
+      w += Force<double>{tau * dual.lin, tau * dual.ang};
+    }
+    const LoopJoint& at = model_.loops.joints[l];
+    if (at.parent_body >= 0) sweeps_.add_wrench(at.parent_body, wrench_on_a(loop, w));
+    if (at.joint.body >= 0) sweeps_.add_wrench(at.joint.body, wrench_on_b(at, w));
+  }
+}
+
+void ArticulatedLoops::store_loop_loads(const SweepInput<double>& in, double* loads) const {
+  std::vector<Force<double>> load(model_.n_loops());
+  for (size_t g = 0; g < groups_.size(); ++g)
+    for (const auto& member : groups_[g].members)
+      for (int i = 0; i < member.n_rows; ++i) {
+        const Force<double> Q = direction(states_[member.loop].basis.Q[i]);
+        const double f = work_[g].f[member.row + i];
+        load[member.loop] += Force<double>{f * Q.lin, f * Q.ang};
+      }
+  for (int l = 0; l < model_.n_loops(); ++l) {
+    const LoopState& loop = states_[l];
+    for (int k = 0; in.loop_tau && k < loop.basis.n; ++k) {
+      const Force<double> dual = direction(loop.basis.dual[k]);
+      const double tau = in.loop_tau[loop.dof[k]];
+      load[l] += Force<double>{tau * dual.lin, tau * dual.ang};
+    }
+    const Vector6<double> user =
+        to_array(inverse_transpose_times(model_.loops.joints[l].joint.to_user, load[l]));
+    std::copy(user.begin(), user.end(), loads + 6 * l);
+  }
+}
+
+}  // namespace linkwise

@@ -1,0 +1,80 @@
+#pragma once
+// Articulated-body recursion with closed loops. Each group of loops is eliminated when the inward
+// sweep reaches its top, the body at which the loops meet. Unit forces F of the loop joints are
+// carried there along the paths of the loops (recursion/loop_steps.hpp), which gives
+//     Psi^T a_top + beta + Lambda f = r
+//     Y_top += Psi Lambda^+ Psi^T,   p_top -= Psi Lambda^+ (r - beta)
+// Outward, f follows from a_top and is a known wrench from there on. Constraints that repeat each
+// other make Lambda singular: of all f that solve it the one of least f^T D f is taken, where D
+// holds what the two bodies of each joint yield to it, each alone. That is an energy, so the choice
+// depends on no unit and no frame. Accelerations are the same for all f.
+#include <memory>
+#include <vector>
+
+#include "linkwise/dynamics/loop_groups.hpp"
+#include "linkwise/linear/semidefinite.hpp"
+#include "linkwise/recursion/tree_sweeps.hpp"
+
+namespace linkwise {
+
+/// How the loops went.
+struct LoopReport {
+  int rows = 0, rank = 0;     ///< of all loop joints
+  double smallest_pivot = 1;  ///< of what counts as independent, over the largest
+  /// By how much dependent constraints contradict each other, over the accelerations that all ask
+  /// for: rounding errors, unless the position is singular or the state is not consistent.
+  double contradiction = 0;
+  bool is_contradictory() const { return contradiction > 1e-6; }
+};
+
+class ArticulatedLoops {
+ public:
+  explicit ArticulatedLoops(const Model& model);
+
+  /// du [nv]; loads [n_joints + n_loops][6] or null. False when some D is not positive definite:
+  /// `failed_body`.
+  bool evaluate(const SweepInput<double>& in, double* du, double* loads);
+
+  int failed_body() const { return sweeps_.failed_body(); }
+  const LoopReport& report() const { return report_; }
+  const LoopStates& states() const { return states_; }
+  const std::vector<LoopGroup>& groups() const { return groups_; }
+
+  /// What the last evaluation knows of a group: for those that ask which loads are determinate.
+  struct Work {
+    std::vector<LoopColumn<double>> columns;
+    std::vector<Force<double>> Psi;              ///< [rows] on the top
+    std::vector<double> Lambda, scaled;          ///< [rows][rows], the latter where D is 1
+    std::vector<double> beta, r, size, f, rhs;   ///< [rows]; size: of what makes up beta and r
+    std::vector<std::array<double, 21>> metric;  ///< factor of D by member
+    SemidefiniteFactor factor;
+  };
+  const Work& work(int group) const { return work_[group]; }
+
+ private:
+  void carry(const SweepInput<double>& in, int g);
+  void place_forces(int g);
+  void factor(int g);
+  double solve(int g, std::vector<double>& x);
+  void reduce_top(int g);
+  void solve_forces(const SweepInput<double>& in, int g, bool with_loads);
+  void add_known_wrenches(const SweepInput<double>& in);
+  void store_loop_loads(const SweepInput<double>& in, double* loads) const;
+
+  const Model& model_;
+  TreeSweeps<double> sweeps_;
+  LoopStates states_;
+  std::vector<LoopGroup> groups_;
+  std::vector<Work> work_;
+  /// Ranges of bodies that are swept between the eliminations of groups, and how many groups are
+  /// eliminated after each: tip to base.
+  struct Stage {
+    std::vector<KindRange> ranges;
+    int first_group, last_group;
+  };
+  std::vector<Stage> stages_;
+  std::vector<Compliance<double>> compliance_a_, compliance_b_;  ///< by loop
+  LoopReport report_;
+};
+
+}  // namespace linkwise

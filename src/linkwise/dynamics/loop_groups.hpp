@@ -1,0 +1,37 @@
+#pragma once
+// Loops that are eliminated together: those that share a body on their way inward. A group is
+// eliminated at its top, the innermost body at which paths of its loops meet, or at the ground.
+// There nothing but a change of that body's articulated inertia is left of it.
+#include <vector>
+
+#include "linkwise/kinematics/loop_states.hpp"
+
+namespace linkwise {
+
+struct LoopGroup {
+  /// Unit forces on one body: rows of the group, in columns [first, first + rows.size()) of all.
+  struct Carrier {
+    int body;
+    std::vector<int> rows;
+    int first;
+    std::vector<int> to;  ///< column at the parent that each adds to, or -1 - row: at the top
+  };
+  /// A joint's own rows [row, row + n_rows), and the columns, or -1 - row, where its forces act.
+  struct Member {
+    int loop, row, n_rows;
+    int on_a, on_b;
+  };
+
+  int top = -1;
+  int rows = 0, columns = 0;
+  std::vector<Member> members;
+  std::vector<Carrier> carriers;  ///< tip to base
+};
+
+/// Rows of a loop joint: directions that it holds.
+int loop_rows(const Model& model, const LoopJoint& loop);
+
+/// Outermost tops first, the ground's group last.
+std::vector<LoopGroup> make_loop_groups(const Model& model);
+
+}  // namespace linkwise

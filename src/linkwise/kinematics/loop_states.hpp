@@ -1,0 +1,79 @@
+#pragma once
+// The joints that close loops, at a state of the tree. Frame E is fixed in body a, F in body b, and
+// the pose of F in E follows from the tree's coordinates. Of the joint between them
+//     q_l = what comes closest,   u_l = P^+ v_rel,   v_rel = X_F v_b - X_FA v_a,   X_FA = X_FE X_E
+//     0 = G_a v_a + G_b v_b,      G_b = Q^T X_F,     G_a = -Q^T X_FA
+//     r = G_a a_a + G_b a_b,      r = Q^T c
+// with P, Q and c of the same stack of elements that a tree joint would have (joints/closure.hpp).
+// What is left of the pose is the gap, which is closed in a state that is consistent.
+#include <span>
+#include <vector>
+
+#include "linkwise/joints/closure.hpp"
+#include "linkwise/kinematics/body_state.hpp"
+
+namespace linkwise {
+
+/// Where a loop runs: from the innermost body of the loop outward to the two that its joint joins.
+struct LoopPath {
+  int meets = -1;               ///< both paths start from this body; -1: from the ground
+  std::vector<int> to_a, to_b;  ///< bodies farther out, base to tip
+};
+LoopPath loop_path(const Model& model, const LoopJoint& loop);
+
+inline std::span<const Element> stack_of(const Model& model, const LoopJoint& loop) {
+  return {model.loops.elements.data() + loop.joint.first_element,
+          static_cast<size_t>(loop.joint.n_elements)};
+}
+
+/// One loop joint. Everything is in F's axes, at F.
+struct LoopState {
+  Transform<double> X_FA;  ///< body a's frame, or the ground's -> F
+  ClosureBasis basis;      ///< P^+T and Q
+  int dof[6];              ///< of the columns of P, as loop joints count them
+  Motion<double> c;        ///< r = Q^T c
+  double gap[6];           ///< position residual g [rows]
+  double slip[6];          ///< Q^T v_rel [rows]: the rate of g where the gap is closed
+
+  int rows() const { return basis.rows(); }
+};
+
+class LoopStates {
+ public:
+  explicit LoopStates(const Model& model);
+
+  /// `last`: coordinates of all loop joints, from which angles are continued, so that turns are
+  /// counted; null: from the zero position.
+  void update(const SweepInput<double>& in, const double* last = nullptr);
+
+  const LoopState& operator[](int l) const { return loops_[l]; }
+  const LoopPath& path(int l) const { return paths_[l]; }
+  /// Coordinates and rates of all loop joints.
+  const std::vector<double>& q() const { return q_; }
+  const std::vector<double>& v() const { return v_; }
+
+ private:
+  void update_loop(bool moving, int l);
+  Motion<double> velocity_of(int body) const {
+    return body >= 0 ? bodies_[body].v : Motion<double>{};
+  }
+
+  const Model& model_;
+  std::vector<KindRange> carriers_;  ///< all bodies between the ground and loop joints
+  std::vector<LoopPath> paths_;
+  std::vector<BodyState<double>> bodies_;
+  std::vector<GeneralState<double>> general_;
+  std::vector<LoopState> loops_;
+  std::vector<double> start_, q_, v_;
+};
+
+/// What wrench w of the joint on its child is on body b, and on body a, in the bodies' own frames.
+inline Force<double> wrench_on_b(const LoopJoint& loop, const Force<double>& w) {
+  return transpose_times(loop.on_child, w);
+}
+inline Force<double> wrench_on_a(const LoopState& state, const Force<double>& w) {
+  const Force<double> reaction = transpose_times(state.X_FA, w);
+  return {-reaction.lin, -reaction.ang};
+}
+
+}  // namespace linkwise

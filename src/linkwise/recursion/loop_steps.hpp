@@ -1,0 +1,77 @@
+#pragma once
+// What unit forces at joints that close loops do to a body on the way inward. A unit force is a
+// wrench F on the body. The body's joint, eliminated, yields to the part z = P^T F, and the parent
+// feels the rest:
+//     y = D^-1 z,  Fbar = F - U y,  F_p += X^T Fbar
+// A row that reads F^T a of the bodies that it acts on thereby becomes
+//     F^T a_n = Fbar^T X a_p + beta + Lambda f,   Lambda = z^T y,   beta = y^T h + Fbar^T c
+// These are the columns of cut forces in steps.hpp, for any joint and number of rows.
+#include "linkwise/recursion/stack_steps.hpp"
+
+namespace linkwise {
+
+/// A unit force of a loop joint at one body.
+template <class S>
+struct LoopColumn {
+  Force<S> F;          ///< on the body; once carried: what its joint transmits, in the body's frame
+  Force<S> at_parent;  ///< once carried: the same as seen by the parent
+  S z[6], y[6];        ///< by the columns of the joint
+  S beta;
+};
+
+/// Each returns the number of columns z.
+template <class J, class S>
+LW_INLINE int carry(const EliminatedAxis<S>& axis, const Motion<S>& c, double pitch,
+                    LoopColumn<S>& column) {
+  column.z[0] = J::project(column.F, pitch);
+  const S y = column.z[0] * axis.D_inverse;
+  column.y[0] = y;
+  column.F -= Force<S>{y * axis.U.lin, y * axis.U.ang};
+  column.beta = y * axis.h + dot(c, column.F);
+  return 1;
+}
+
+template <class S>
+int carry(const GeneralState<S>& joint, const EliminatedStack<S>& stack, const Motion<S>& c,
+          LoopColumn<S>& column) {
+  for (int k = 0; k < joint.n; ++k) column.z[k] = column.y[k] = dot(joint.P[k], column.F);
+  cholesky_solve(joint.n, stack.L, column.y);
+  column.beta = S{};
+  for (int k = 0; k < joint.n; ++k) {
+    const S y = column.y[k];
+    column.F -= Force<S>{y * stack.U[k].lin, y * stack.U[k].ang};
+    column.beta += y * stack.h[k];
+  }
+  column.beta += dot(c, column.F);
+  return joint.n;
+}
+
+/// A floating joint transmits nothing.
+template <class S>
+int carry(const EliminatedFree<S>& free, LoopColumn<S>& column) {
+  const Vector6<S> z = to_array(column.F), y = to_array(solve(free.L, column.F));
+  for (int k = 0; k < 6; ++k) {
+    column.z[k] = z[k];
+    column.y[k] = y[k];
+  }
+  column.beta = dot(free.a, column.F);
+  column.F = {};
+  return 6;
+}
+
+/// The joint under the force f.
+template <class S>
+LW_INLINE void apply(const LoopColumn<S>& column, const S& f, EliminatedAxis<S>& axis) {
+  axis.h += f * column.z[0];
+}
+template <class S>
+LW_INLINE void apply(const LoopColumn<S>& column, const S& f, int n, EliminatedStack<S>& stack) {
+  for (int k = 0; k < n; ++k) stack.h[k] += f * column.z[k];
+}
+template <class S>
+LW_INLINE void apply(const LoopColumn<S>& column, const S& f, EliminatedFree<S>& free) {
+  const Motion<S> y = to_motion(column.y);
+  free.a += Motion<S>{f * y.lin, f * y.ang};
+}
+
+}  // namespace linkwise

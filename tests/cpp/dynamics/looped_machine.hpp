@@ -1,0 +1,156 @@
+#pragma once
+// A tree with loops closed at a given position by joints of any type, and states that keep them
+// closed.
+#include <string>
+#include <vector>
+
+#include "kinematics/world_twin.hpp"
+#include "linkwise/kinematics/loop_states.hpp"
+#include "linkwise/linear/semidefinite.hpp"
+#include "model/machines.hpp"
+
+namespace linkwise::testing {
+
+/// The elements of a joint as a model places them, its axis in any direction.
+inline std::vector<Element> random_stack(JointType type, Draws& draws) {
+  if (type == JointType::fixed) {
+    Element weld;
+    weld.kind = ElementKind::fixed;
+    weld.nq = weld.nv = 0;
+    weld.placement = {random_rotation(draws), random_vector3(draws)};
+    return {weld};
+  }
+  ModelSpec spec = tree_spec({type}, {-1}, draws);
+  spec.joints[0].axes.resize(type == JointType::universal ? 2 : 1);
+  return Model(spec).elements;
+}
+
+inline Transform<double> stack_pose(std::span<const Element> stack, const double* q) {
+  Transform<double> X = element_pose(stack[0], q);
+  for (size_t i = 1; i < stack.size(); ++i) X = element_pose(stack[i], q) * X;
+  return X;
+}
+
+/// World -> frame of each body.
+inline std::vector<Transform<double>> body_poses(const Model& tree, const double* q) {
+  std::vector<Transform<double>> X(tree.n_bodies());
+  for (int n = 0; n < tree.n_bodies(); ++n) {
+    const BodyTopology& at = tree.topology[n];
+    X[n] = stack_pose(std::span(tree.elements).subspan(at.first_element, at.n_elements), q);
+    if (at.parent >= 0) X[n] = X[n] * X[at.parent];
+  }
+  return X;
+}
+
+inline Transform<double> inverse(const Transform<double>& X) {
+  return {transpose(X.R), -(X.R * X.r)};
+}
+
+struct LoopedMachine {
+  Model tree, model;  ///< without and with loops
+  std::vector<double> q, v;
+  std::vector<double> q_loops;  ///< of loop joints where they were closed
+
+  LoopedMachine(const ModelSpec& spec, Draws& draws) : tree(spec), model(spec) {
+    MachineState state = random_state(tree, draws);
+    q = state.q;
+    v = state.v;
+  }
+
+  /// Joins bodies a and b (-1: ground) where they are.
+  void close(JointType type, int a, int b, Draws& draws) {
+    std::vector<Element> stack = random_stack(type, draws);
+    LoopJoint loop;
+    LoopJoints& loops = model.loops;
+    JointInfo& joint = loop.joint;
+    joint.name = "loop" + std::to_string(loops.joints.size());
+    joint.type = type;
+    joint.body = b;
+    joint.first_element = static_cast<int>(loops.elements.size());
+    joint.n_elements = static_cast<int>(stack.size());
+    joint.q = loops.nq;
+    joint.v = loops.nv;
+    joint.to_user = {random_rotation(draws), random_vector3(draws)};
+    loop.parent_body = a;
+    loop.on_parent = {random_rotation(draws), random_vector3(draws)};
+    for (Element& e : stack) {
+      e.q = loops.nq;
+      e.v = loops.nv;
+      loops.nq += e.nq;
+      loops.nv += e.nv;
+      loops.elements.push_back(e);
+      for (int i = 0; i < e.nq; ++i) q_loops.push_back(draws.uniform(-1, 1));
+    }
+    joint.nq = loops.nq - joint.q;
+    joint.nv = loops.nv - joint.v;
+    for (auto& values : loops.dof) values.resize(loops.nv);
+    const auto poses = body_poses(tree, q.data());
+    const auto at = [&](int body) {
+      return body < 0 ? Transform<double>{Mat3<double>::identity(), {}} : poses[body];
+    };
+    loop.on_child = stack_pose(stack, q_loops.data()) * loop.on_parent * at(a) * inverse(at(b));
+    loops.joints.push_back(loop);
+  }
+  /// The last loop joint once more: a copy of it holds what it holds already.
+  void close_again() {
+    LoopJoint loop = model.loops.joints.back();
+    loop.joint.name += "_again";
+    model.loops.joints.push_back(loop);
+  }
+
+  SweepInput<double> input() const {
+    SweepInput<double> in;
+    in.q = q.data();
+    in.v = v.data();
+    return in;
+  }
+
+  /// K [rows][nv], by unit rates: slips of the loops.
+  std::vector<double> rows(int& n_rows) const {
+    LoopStates states(model);
+    std::vector<std::vector<double>> columns;
+    std::vector<double> unit(tree.nv());
+    for (int k = 0; k < tree.nv(); ++k) {
+      unit[k] = 1;
+      SweepInput<double> in = input();
+      in.v = unit.data();
+      states.update(in);
+      columns.push_back({});
+      for (int l = 0; l < model.n_loops(); ++l)
+        columns.back().insert(columns.back().end(), states[l].slip,
+                              states[l].slip + states[l].rows());
+      unit[k] = 0;
+    }
+    n_rows = columns.empty() ? 0 : static_cast<int>(columns[0].size());
+    std::vector<double> K(static_cast<size_t>(n_rows) * tree.nv());
+    for (int i = 0; i < n_rows; ++i)
+      for (int k = 0; k < tree.nv(); ++k) K[i * tree.nv() + k] = columns[k][i];
+    return K;
+  }
+
+  /// Rates that keep the loops closed: v -= K^T (K K^T)^+ K v. Returns the rank of K.
+  int make_consistent() {
+    int n = 0;
+    const std::vector<double> K = rows(n);
+    const int nv = tree.nv();
+    std::vector<double> A(static_cast<size_t>(n) * n), b(n), x(n);
+    SemidefiniteFactor factor;
+    for (int twice = 0; twice < 2; ++twice) {
+      for (int i = 0; i < n; ++i) {
+        b[i] = 0;
+        for (int k = 0; k < nv; ++k) b[i] += K[i * nv + k] * v[k];
+        for (int j = 0; j < n; ++j) {
+          A[i * n + j] = 0;
+          for (int k = 0; k < nv; ++k) A[i * n + j] += K[i * nv + k] * K[j * nv + k];
+        }
+      }
+      factor.factor(n, A.data(), 1e-9);
+      factor.solve(b.data(), x.data());
+      for (int k = 0; k < nv; ++k)
+        for (int i = 0; i < n; ++i) v[k] -= K[i * nv + k] * x[i];
+    }
+    return factor.rank();
+  }
+};
+
+}  // namespace linkwise::testing

@@ -1,0 +1,221 @@
+// Accelerations and loads with loops, against equations that share nothing with their elimination:
+// the twin's Newton and Euler with the loops' loads as wrenches on an open tree, and the loops'
+// relative motion differentiated by a complex step. Together these are all the equations of motion.
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "dynamics/dynamics_case.hpp"
+#include "dynamics/looped_machine.hpp"
+#include "linkwise/dynamics/articulated_loops.hpp"
+
+namespace linkwise::testing {
+namespace {
+
+using Complex = WorldTwin::Complex;
+
+/// Frame on a body by its link: pose, and velocity at the origin, in the world.
+template <class T>
+struct FrameAt {
+  Mat3<T> R;  ///< to world axes
+  Vec3<T> p, v, w;
+};
+FrameAt<Complex> frame_at(const Model& tree, const WorldTwin::Motions<Complex>& m, int body,
+                          const Transform<double>& X) {
+  for (const JointInfo& j : tree.joints) {
+    if (j.body != body || !j.last_of_body) continue;
+    const auto& link = m.pose[j.link];
+    // Frame in the link's axes. The joint's user frame is the link's.
+    const Transform<double> at = X * inverse(j.to_user);
+    FrameAt<Complex> out;
+    out.R = link.R * transpose(at.R);
+    out.p = link.p + link.R * at.r;
+    out.w = m.velocity[j.link].w;
+    out.v = m.velocity[j.link].s + cross(out.w, out.p);
+    return out;
+  }
+  return {};
+}
+
+/// v_rel of F against E, in F's axes.
+std::vector<Complex> relative_motion(const LoopedMachine& machine, const LoopJoint& loop,
+                                     const WorldTwin::Motions<Complex>& m) {
+  const auto F = [&] {
+    if (loop.joint.body >= 0) return frame_at(machine.tree, m, loop.joint.body, loop.on_child);
+    FrameAt<Complex> out;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) out.R.m[3 * i + j] = loop.on_child.R.m[3 * j + i];
+    out.p = Vec3<Complex>{loop.on_child.r.x, loop.on_child.r.y, loop.on_child.r.z};
+    return out;
+  }();
+  FrameAt<Complex> E;
+  if (loop.parent_body >= 0) E = frame_at(machine.tree, m, loop.parent_body, loop.on_parent);
+  const Vec3<Complex> lin = transpose_times(
+      F.R, F.v - (loop.parent_body >= 0 ? E.v + cross(E.w, F.p - E.p) : Vec3<Complex>{}));
+  const Vec3<Complex> ang = transpose_times(F.R, F.w - E.w);
+  return {lin.x, lin.y, lin.z, ang.x, ang.y, ang.z};
+}
+
+/// P(q) u of a stack, in F's axes.
+Vector6<double> joint_motion(std::span<const Element> stack, const double* q, const double* u) {
+  Motion<double> v;
+  for (const Element& e : stack) {
+    v = element_pose(e, q) * v;
+    for (int k = 0; k < e.nv; ++k) {
+      const auto column = element_column<double>(e, k);
+      v += Motion<double>{u[e.v + k] * column.lin, u[e.v + k] * column.ang};
+    }
+  }
+  return to_array(v);
+}
+
+/// By how much du misses the derivative of v_rel = P u in the directions that the loop holds.
+double violation(const LoopedMachine& machine, const LoopStates& states, int l,
+                 const std::vector<double>& du) {
+  const LoopJoint& loop = machine.model.loops.joints[l];
+  const WorldTwin twin(machine.tree);
+  const auto moving = relative_motion(machine, loop, twin.moved(machine.q, machine.v, du));
+  const std::span<const Element> stack = stack_of(machine.model, loop);
+  std::vector<double> rate(states.q().size());
+  for (const Element& e : stack)
+    element_position_rate(e, states.q().data(), states.v().data(), rate.data());
+  const auto motion_at = [&](double t) {
+    std::vector<double> q = states.q();
+    for (int i = loop.joint.q; i < loop.joint.q + loop.joint.nq; ++i) q[i] += t * rate[i];
+    return joint_motion(stack, q.data(), states.v().data());
+  };
+  constexpr double h = 1e-3;
+  const auto a1 = motion_at(h), b1 = motion_at(-h), a2 = motion_at(2 * h), b2 = motion_at(-2 * h),
+             a3 = motion_at(3 * h), b3 = motion_at(-3 * h);
+  double worst = 0;
+  for (int i = 0; i < states[l].rows(); ++i) {
+    double sum = 0;
+    for (int k = 0; k < 6; ++k) {
+      const double turned =
+          (45 * (a1[k] - b1[k]) - 9 * (a2[k] - b2[k]) + (a3[k] - b3[k])) / (60 * h);
+      sum += states[l].basis.Q[i][k] * (moving[k].imag() / WorldTwin::step - turned);
+    }
+    worst = std::max(worst, std::abs(sum));
+  }
+  return worst;
+}
+
+/// Evaluates, and compares with the equations of motion.
+void expect_motion(const LoopedMachine& machine, std::uint64_t seed, int want_rank) {
+  const Model& model = machine.model;
+  const DynamicsCase c(machine.tree, seed);
+  Draws draws(seed + 1);
+  std::vector<double> loop_tau(model.loops.nv);
+  for (double& x : loop_tau) x = draws.normal();
+  SweepInput<double> in = machine.input();
+  in.tau = c.tau.data();
+  in.prescribed = c.given.data();
+  in.external = c.external.data();
+  in.loop_tau = loop_tau.data();
+  std::vector<double> du(model.nv()), loads(6 * (model.n_joints() + model.n_loops()));
+  ArticulatedLoops kernel(model);
+  ASSERT_TRUE(kernel.evaluate(in, du.data(), loads.data()));
+  EXPECT_EQ(kernel.report().rank, want_rank);
+  EXPECT_LT(kernel.report().contradiction, 1e-9);
+
+  double size = 10;
+  for (const double x : du) size = std::max(size, std::abs(x));
+  for (int l = 0; l < model.n_loops(); ++l)
+    EXPECT_LT(violation(machine, kernel.states(), l, du), 1e-9 * size) << "loop " << l;
+
+  std::vector<double> external = c.external;
+  const auto push = [&](int body, const Force<double>& w) {
+    for (int j = 0; j < machine.tree.n_joints(); ++j) {
+      const JointInfo& joint = machine.tree.joints[j];
+      if (joint.body != body || !joint.last_of_body) continue;
+      const auto user = to_array(inverse_transpose_times(joint.to_user, w));
+      for (int i = 0; i < 6; ++i) external[6 * j + i] += user[i];
+    }
+  };
+  double largest = 1;
+  for (int l = 0; l < model.n_loops(); ++l) {
+    const LoopJoint& loop = model.loops.joints[l];
+    const LoopState& at = kernel.states()[l];
+    const Force<double> w = transpose_times(
+        loop.joint.to_user, to_force(&loads[6 * (static_cast<size_t>(model.n_joints()) + l)]));
+    push(loop.joint.body, transpose_times(loop.on_child, w));
+    push(loop.parent_body, wrench_on_a(at, w));
+    for (const double x : to_array(w)) largest = std::max(largest, std::abs(x));
+  }
+  const auto want = WorldTwin(machine.tree).inverse_dynamics(machine.q, machine.v, du, external);
+  for (const double x : want.loads) largest = std::max(largest, std::abs(x));
+  for (const Element& e : machine.tree.elements)
+    for (int k = e.v; k < e.v + e.nv; ++k)
+      if (!e.prescribed) {
+        EXPECT_NEAR(want.tau[k], c.tau[k], 1e-10 * largest) << "dof " << k;
+      }
+  for (size_t i = 0; i < want.loads.size(); ++i)
+    EXPECT_NEAR(loads[i], want.loads[i], 1e-10 * largest) << "load " << i;
+  // What a loop joint transmits along its own columns is what drives it.
+  for (int l = 0; l < model.n_loops(); ++l) {
+    const LoopJoint& loop = model.loops.joints[l];
+    const std::span<const Element> stack = stack_of(model, loop);
+    const Vector6<double> w = to_array(transpose_times(
+        loop.joint.to_user, to_force(&loads[6 * (static_cast<size_t>(model.n_joints()) + l)])));
+    std::vector<double> unit(model.loops.nv);
+    for (int k = loop.joint.v; k < loop.joint.v + loop.joint.nv; ++k) {
+      unit[k] = 1;
+      EXPECT_NEAR(along(joint_motion(stack, kernel.states().q().data(), unit.data()), w),
+                  loop_tau[k], 1e-10 * largest);
+      unit[k] = 0;
+    }
+  }
+  // Loads asked for or not: the same accelerations.
+  std::vector<double> again(model.nv());
+  ArticulatedLoops other(model);
+  ASSERT_TRUE(other.evaluate(in, again.data(), nullptr));
+  for (int k = 0; k < model.nv(); ++k) EXPECT_NEAR(again[k], du[k], 1e-11 * size);
+}
+
+TEST(ArticulatedLoops, EveryJointTypeClosesALoop) {
+  for (const JointType type : all_joint_types) {
+    if (type == JointType::composite) continue;
+    SCOPED_TRACE(joint_type_name(type));
+    for (const bool to_ground : {true, false}) {
+      Draws draws(to_ground ? 31 : 32);
+      LoopedMachine machine(
+          tree_spec({JointType::revolute, JointType::universal, JointType::spherical,
+                     JointType::prismatic, JointType::spherical, JointType::revolute,
+                     JointType::universal, JointType::spherical},
+                    {-1, 0, 1, 2, 1, 4, 5, 6}, draws),
+          draws);
+      machine.close(type, to_ground ? -1 : 7, 3, draws);
+      const int rank = machine.make_consistent();
+      EXPECT_EQ(rank, 6 - machine.model.loops.joints[0].joint.nv);
+      expect_motion(machine, 5, rank);
+    }
+  }
+}
+
+TEST(ArticulatedLoops, RandomTreesWithSeveralLoops) {
+  for (int sample = 0; sample < 60; ++sample) {
+    SCOPED_TRACE(sample);
+    Draws draws(100 + sample);
+    const int n = 4 + draws.below(14);
+    ModelSpec spec = tree_spec(random_types(n, draws), random_parents(n, draws), draws);
+    spec.floating_base = sample % 3 == 0;
+    LoopedMachine machine(spec, draws);
+    const int bodies = machine.tree.n_bodies();
+    if (bodies < 2) continue;
+    const int loops = 1 + draws.below(4);
+    for (int l = 0; l < loops; ++l) {
+      const int a = draws.below(bodies + 1) - 1;
+      int b = draws.below(bodies + 1) - 1;
+      if (a == b) b = a < bodies - 1 ? a + 1 : a - 1;
+      machine.close(all_joint_types[draws.below(static_cast<int>(JointType::composite))], a, b,
+                    draws);
+      if (sample % 4 == 1 && l == 0) machine.close_again();
+    }
+    expect_motion(machine, sample, machine.make_consistent());
+  }
+}
+
+}  // namespace
+}  // namespace linkwise::testing
