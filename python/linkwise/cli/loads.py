@@ -17,6 +17,7 @@ from linkwise.cli.output import (
     say_warnings,
     table,
     text,
+    whose,
     write_csv,
 )
 
@@ -101,17 +102,30 @@ def loads(
         from linkwise.plot import write_report
 
         write_report(opened, html, found, machine)
+    ignored = opened.warnings
+    if joint or csv or as_json:  # whose mean, RMS and duty are of the samples
+        ignored = ignored + sampling_warnings(opened, joint)
     if as_json:
-        ignored = opened.warnings
-        print_json({"run": str(run), "peaks": records, "split": shares, "warnings": ignored})
+        how = found["summary"].attrs["extremes"]
+        about = {"run": str(run), "extremes": how, "peaks": records, "split": shares}
+        print_json(about | {"warnings": ignored})
         return
     screen = console()
-    for made in tables(records, shares, joint):
+    for made in tables(records, shares, joint, found["summary"].attrs["extremes"]):
         screen.print(made)
-    say_warnings(opened.warnings)
+    say_warnings(ignored)
     for path in (csv, html):
         if path is not None:
             screen.print(f"Written: {path}", markup=False)
+
+
+def sampling_warnings(run: Run, joints: list[str] | None) -> list[dict[str, str]]:
+    """What mean, RMS and duty do not hold."""
+    from linkwise.loads.extremes import missed_peaks
+
+    missed = missed_peaks(run, joints)
+    text = f"mean, RMS and duty are of the samples: {missed[0]}" if missed else ""
+    return [{"element": "samples", "text": text}] if missed else []
 
 
 def machine_of(run: Run, file: Path | None) -> Model:
@@ -196,7 +210,8 @@ def peak_records(found: dict[str, Any], joints: list[str] | None) -> list[dict[s
     summary: xr.Dataset = found["summary"]
     components = [str(c) for c in summary["component"].values]
     units = [str(u) for u in summary["quantity_units"].values]
-    first, last = ("peak", "peak_time"), ("sampling", "rms", "mean", "minimum", "maximum", "duty")
+    first = ("peak", "peak_time")
+    last = ("sampling", "missed", "rms", "mean", "minimum", "maximum", "duty")
     columns = {key: summary[key].values for key in first}
     for other, keys in (
         ("bounds", ("algebraic", "integration", "plus_minus")),
@@ -250,9 +265,13 @@ def _with_bound(record: dict[str, Any]) -> str:
 
 
 def tables(
-    records: list[dict[str, Any]], shares: list[dict[str, Any]], joints: list[str] | None
+    records: list[dict[str, Any]],
+    shares: list[dict[str, Any]],
+    joints: list[str] | None,
+    extremes: str,
 ) -> list[Any]:
-    made = [_joint_table(records, name) for name in joints] if joints else [_all_joints(records)]
+    made = [_joint_table(records, name, whose(extremes)) for name in joints or ()]
+    made = made or [_all_joints(records, whose(extremes))]
     rated = [record for record in records if record.get("rating", 0) > 0]
     if rated:
         made.append(_margin_table(rated))
@@ -262,12 +281,13 @@ def tables(
     return made
 
 
-def _all_joints(records: list[dict[str, Any]]) -> Any:
+def _all_joints(records: list[dict[str, Any]], some: str) -> Any:
     by_joint: dict[str, dict[str, dict[str, Any]]] = {}
     for record in records:
         by_joint.setdefault(record["joint"], {})[record["quantity"]] = record
     rows = list(by_joint.items())
-    title = "Peak joint loads, inboard on outboard body, in the joint frame at the joint point"
+    title = f"Peak joint loads{some}, inboard on outboard body"
+    title += ", in the joint frame at the joint point"
     if len(rows) > _MOST_JOINTS:
         rows = sorted(rows, key=lambda item: -item[1]["force"]["peak"])[:_MOST_JOINTS]
         title += f" (the {_MOST_JOINTS} largest forces of {len(by_joint)} joints)"
@@ -286,12 +306,13 @@ def _at_its_time(record: dict[str, Any]) -> str:
     return f"{_with_bound(record)} @ {number(record['peak_time'])}"
 
 
-def _joint_table(records: list[dict[str, Any]], joint: str) -> Any:
+def _joint_table(records: list[dict[str, Any]], joint: str, some: str) -> Any:
     from linkwise.base import COMPONENTS
 
     headings = ["peak", "at [s]", "rms", "minimum", "maximum", "duty", *COMPONENTS]
     columns = [("quantity", "left"), *((name, "right") for name in headings)]
-    result = table(f"Load of {text(joint)}; fx ... nz at the time of each peak", columns)
+    title = f"Load of {text(joint)}{some}; fx ... nz at the time of each peak"
+    result = table(f"{title}, rms and duty of the samples", columns)
     for record in records:
         if record["joint"] != joint:
             continue

@@ -101,21 +101,28 @@ def number(value: float, digits: int = 4) -> str:
     return "" if not math.isfinite(value) else f"{value:.{digits}g}"
 
 
-def peak_records(run: Run) -> list[dict[str, Any]]:
-    """Per joint the largest force and moment and when, as plain records."""
+def whose(extremes: str) -> str:
+    """What titles of peaks add, by the attribute `extremes`: nothing unless samples stand there."""
+    return "" if extremes == "along the steps" else f" {extremes} (the run holds no extremes)"
+
+
+def peak_records(run: Run) -> tuple[list[dict[str, Any]], str]:
+    """Per joint the largest force and moment and when, as plain records; the attribute `extremes`
+    of the peaks."""
     peaks = run.peak_loads()
     columns = ("force", "force_time", "moment", "moment_time")
     values = [peaks[name].values.tolist() for name in columns]
-    return [
+    records = [
         {"joint": joint, **dict(zip(columns, row, strict=True))}
         for joint, *row in zip(peaks["joint"].values.tolist(), *values, strict=True)
     ]
+    return records, str(peaks.attrs["extremes"])
 
 
-def peak_table(records: Sequence[Mapping[str, Any]], limit: int = 40) -> Table:
-    """The records as a table; of many joints those with the largest forces."""
+def peak_table(records: Sequence[Mapping[str, Any]], extremes: str, limit: int = 40) -> Table:
+    """What `peak_records` returned as a table; of many joints those with the largest forces."""
     shown = list(records)
-    title = "Peak joint loads"
+    title = f"Peak joint loads{whose(extremes)}"
     if len(shown) > limit:
         shown = sorted(shown, key=lambda record: -record["force"])[:limit]
         title += f" (the {limit} largest forces of {len(records)} joints)"

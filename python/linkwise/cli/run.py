@@ -96,15 +96,16 @@ def show_run(run: Run, as_json: bool) -> None:
     """How the run went, the peak loads, and where the results are."""
     from linkwise.loads.limits import beyond_limits
 
-    peaks = peak_records(run) if has_loads(run) else []
+    peaks, extremes = peak_records(run) if has_loads(run) else ([], "")
     beyond = beyond_limits(run) if run.dataset.sizes["time"] else []
     if as_json:
-        print_json({**summary(run), "peak_loads": peaks, "beyond_limits": beyond})
+        about = {"peak_loads": peaks, "extremes": extremes, "beyond_limits": beyond}
+        print_json(summary(run) | about)
         return
     attrs = run.dataset.attrs
     screen = console()
     if peaks:
-        screen.print(peak_table(peaks))
+        screen.print(peak_table(peaks, extremes))
     screen.print(
         f"Simulated {attrs['stop_time']:g} s in {number(attrs['wall_time'], 3)} s: "
         f"{attrs['total_steps']} steps, {attrs['total_evaluations']} evaluations, "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from linkwise._core import InputError
-from linkwise.base import DERIVED, HALVES, AnyArray, Array, lengths
+from linkwise.base import COMPONENTS, DERIVED, HALVES, AnyArray, Array, lengths
 from linkwise.loads.samples import blocks, joint_names, rows
 
 if TYPE_CHECKING:
@@ -98,6 +98,29 @@ def load_at_extremes(run: RunLike) -> Array:
     assert found is not None
     load: Array = np.where(found.is_minimum[..., None], wrench[0], wrench[1])
     return load
+
+
+def component_extremes(run: RunLike, joint: int) -> dict[str, tuple[Array, Array]]:
+    """Times and values of the smallest and largest of each load component of a joint; none where
+    the run holds no extremes."""
+    between = extremes_of(run, "joint_load")
+    if between is None:
+        return dict.fromkeys(COMPONENTS, (np.zeros(0), np.zeros(0)))
+    times = np.stack([between.minimum_time[joint], between.maximum_time[joint]])
+    values = np.stack([between.minimum[joint], between.maximum[joint]])
+    return {name: (times[:, c], values[:, c]) for c, name in enumerate(COMPONENTS)}
+
+
+def loads_at_peaks(run: RunLike, joint: int) -> tuple[Array, Array]:
+    """Times (n,) in order and whole loads (n, 6) of a joint when its force and its moment were
+    largest; none where the run holds no extremes."""
+    between = extremes_of(run, "quantity")
+    if between is None:
+        return np.zeros(0), np.zeros((0, len(COMPONENTS)))
+    which = quantity_rows([name for name, _, _ in HALVES])
+    times, first = np.unique(between.maximum_time[which, joint], return_index=True)
+    found = ~np.isnan(times)
+    return times[found], load_at_extremes(run)[which, joint][first[found]]
 
 
 def states_at_peaks(run: RunLike, model: Model) -> State | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from linkwise._core import InputError
 from linkwise.io.writing import check_file, write_text
+from linkwise.loads.extremes import what_samples_miss
 from linkwise.loads.fatigue import damage_equivalent
 from linkwise.loads.peaks import envelope
 from linkwise.notes import recorded_warnings
@@ -65,6 +66,17 @@ chooser.addEventListener("change", () => draw(place, figures.joints[chooser.valu
 draw(place, figures.joints[chooser.value]);
 draw(document.getElementById("energy-figures"), figures.energy);
 """
+
+
+_PEAKS = {
+    "along the steps": "Of the whole motion, between the samples too.",
+    "of the samples": "Of the samples: the run holds no extremes, and peaks between the samples "
+    "are not known.",
+}
+
+
+def _note(text: str) -> str:
+    return f"<p class='note'>{escape(text)}</p>"
 
 
 def _number(value: float, digits: int = 4) -> str:
@@ -248,6 +260,7 @@ def write_report(
         else ""
     )
     scenario = str(run.dataset.attrs.get("scenario", ""))
+    missed = what_samples_miss(run)
     parts = [
         "<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'>",
         "<meta http-equiv='Content-Security-Policy' content=\"default-src 'none'; "
@@ -257,14 +270,23 @@ def write_report(
         "frame fixed in the outboard body, moments about the joint point. SI units. ± is the "
         "bound of algebraic and integration error.</p>",
         _warnings(run),
-        f"<h2>Peaks</h2>{_peak_table(summary, limits)}",
+        f"<h2>Peaks</h2>{_note(_PEAKS[summary.attrs['extremes']])}{_peak_table(summary, limits)}",
         f"<h2>Against the ratings</h2>{_margin_table(summary, left, limits)}"
         if left is not None
         else "",
         f"<h2>Envelopes</h2>{_envelope_table(run)}",
-        f"<h2>Damage-equivalent ranges{fewer}</h2><p class='note'>Peak to peak, one cycle a second "
-        f"of the run.</p>{_fatigue_table(run, drawn)}",
-        f"<h2>Over time{fewer}</h2><label>Joint <select id='joint'>{chooser}</select></label>",
+        f"<h2>Damage-equivalent ranges{fewer}</h2>"
+        + _note(
+            f"Peak to peak, one cycle a second of the run. Of the samples and the largest and "
+            f"smallest values between them; {missed}."
+        )
+        + _fatigue_table(run, drawn),
+        f"<h2>Over time{fewer}</h2>"
+        + _note(
+            f"Lines, areas, durations and spectra are of the samples, dots are extremes "
+            f"between them; {missed}."
+        )
+        + f"<label>Joint <select id='joint'>{chooser}</select></label>",
         "<div id='joint-figures' class='grid'></div>",
         "<h2>Energy and solver</h2><div id='energy-figures' class='grid'></div>",
         _health(run, limits),

@@ -19,6 +19,7 @@ from linkwise.base import HALVES, Array, lengths
 from linkwise.loads.causes import Split, along_total
 from linkwise.loads.energy import energy_balance
 from linkwise.loads.engineering import derive, joint_directions
+from linkwise.loads.extremes import component_extremes, loads_at_peaks
 from linkwise.loads.fatigue import load_duration, spectrum
 from linkwise.loads.samples import blocks, joint_names, model_of, rows, select
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from linkwise.loads.samples import RunLike
 
 Figure = dict[str, Any]
+_COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
 TIMES = "times"
 """Stands for the times of the samples drawn, which the page holds once."""
 
@@ -61,12 +63,25 @@ def _line(name: str, x: Any, y: npt.ArrayLike, **more: Any) -> Figure:
     } | more
 
 
-def _histories(load: Array) -> list[Figure]:
+def _dots(color: str, x: Array, y: Array) -> Figure:
+    """Extremes between the samples, in the colour of their line."""
+    dots = {"color": color, "size": 7}
+    more = {"mode": "markers", "marker": dots, "showlegend": False}
+    return _line("extreme", packed(x), y, **more)
+
+
+def _histories(load: Array, run: RunLike, joint: int) -> list[Figure]:
     made = []
+    extremes = component_extremes(run, joint)
+    peak_times, peaks = loads_at_peaks(run, joint)
     for k, (half, unit, components) in enumerate(HALVES):
         part = load[:, 3 * k : 3 * k + 3]
-        data = [_line(name, TIMES, part[:, c]) for c, name in enumerate(components)]
+        data = []
+        for c, (name, color) in enumerate(zip(components, _COLOURS, strict=False)):
+            data.append(_line(name, TIMES, part[:, c], line={"color": color}))
+            data.append(_dots(color, *extremes[name]))
         data.append(_line("size", TIMES, lengths(part), line={"color": "black"}))
+        data.append(_dots("black", peak_times, lengths(peaks[:, 3 * k : 3 * k + 3])))
         layout = _layout(half.capitalize(), "time [s]", f"{half} [{unit}]")
         made.append({"data": data, "layout": layout})
     return made
@@ -74,7 +89,6 @@ def _histories(load: Array) -> list[Figure]:
 
 def _areas(shares: Array, causes: list[str]) -> list[Figure]:
     """Stacked areas: what adds to the size above zero, what relieves below."""
-    colours = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
     made = []
     for k, (half, unit, _) in enumerate(HALVES):
         parts, total = along_total(shares[..., 3 * k : 3 * k + 3])
@@ -84,7 +98,7 @@ def _areas(shares: Array, causes: list[str]) -> list[Figure]:
                 values = sign * np.maximum(sign * parts[:, c], 0)
                 style = {
                     "stackgroup": group,
-                    "line": {"width": 0, "color": colours[c % len(colours)]},
+                    "line": {"width": 0, "color": _COLOURS[c % len(_COLOURS)]},
                     "legendgroup": cause,
                     "showlegend": sign > 0,
                 }
@@ -160,7 +174,7 @@ def joint_figures(
     shares, causes = _thinned_shares(run, machine, every, where)
     made: dict[str, list[Figure]] = {}
     for j, joint in enumerate(joints):
-        figures = _histories(load[:, j])
+        figures = _histories(load[:, j], run, where[j])
         if shares is not None:
             figures += _areas(shares[:, :, j], causes)
         own, direction = load[:, j], directions[where[j]]

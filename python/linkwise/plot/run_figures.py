@@ -10,6 +10,7 @@ from linkwise._core import InputError
 from linkwise.base import HALVES
 from linkwise.loads.causes import along_total, split
 from linkwise.loads.energy import energy_balance
+from linkwise.loads.extremes import component_extremes, missed_peaks
 from linkwise.loads.samples import joint_position
 
 if TYPE_CHECKING:
@@ -37,14 +38,21 @@ class RunPlots:
         self._run = run
 
     def loads(self, joint: str) -> Any:
-        """Force and moment of a joint over time, by component, at the joint point in its frame."""
+        """Force and moment of a joint over time, by component, at the joint point in its frame.
+
+        Lines join the samples; dots are each component's extremes between them.
+        """
         where = joint_position(self._run, joint)
         load = self._run.dataset["joint_load"].isel(joint=where)
         figure, axes = _figure(2)
         times = self._run.dataset["time"].values
+        extremes = component_extremes(self._run, where)
         for axis, (half, unit, components) in zip(axes, HALVES, strict=True):
             for name in components:
-                axis.plot(times, load.sel(component=name).values, label=name, linewidth=1.2)
+                (line,) = axis.plot(
+                    times, load.sel(component=name).values, label=name, linewidth=1.2
+                )
+                axis.plot(*extremes[name], "o", color=line.get_color(), markersize=4)
             axis.set_ylabel(f"{half} [{unit}]")
             axis.legend(loc="upper right", ncols=3, frameon=False)
         figure.suptitle(f"Load of {joint}: inboard on outboard body, joint frame")
@@ -71,6 +79,9 @@ class RunPlots:
             axis.set_ylabel(f"{half} [{unit}]")
         axes[0].legend(loc="upper right", ncols=4, frameon=False)
         figure.suptitle(f"Load of {joint} by cause")
+        missed = missed_peaks(self._run, [joint])
+        if missed:
+            axes[0].set_title(str(missed[0]).replace("; ", ";\n"), fontsize="small")
         return figure
 
     def energy(self) -> Any:

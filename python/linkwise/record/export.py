@@ -15,12 +15,15 @@ from linkwise._core import InputError
 from linkwise.base import blocks
 from linkwise.io.complaint import shown
 from linkwise.io.writing import csv_cell, written_whole
+from linkwise.record.extremes import PREFIX, ROWS
 from linkwise.record.schema import TABLE
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _NETCDF_HEAD = 1 << 17  # of names and attributes
+
+_EXTREME_COLUMNS = ("minimum", "minimum_time", "maximum", "maximum_time")
 
 # Scalars of one group share a table.
 _GROUPS = {row["name"]: row["group"] for row in TABLE if row["axis"] == "none"}
@@ -110,13 +113,27 @@ def _write_table(dataset: xr.Dataset, names: list[str], path: Path) -> None:
             table.writerows([time, *itertools.chain(*values)] for time, *values in rows)
 
 
+def _write_extremes(dataset: xr.Dataset, names: list[str], path: Path) -> None:
+    """A row per column of the tables of samples: its extremes, between the samples too."""
+    taken = [ROWS.index(name) for name in _EXTREME_COLUMNS]
+    with written_whole(path) as aside, open(aside, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        times = ("[s]" if name.endswith("time") else "" for name in _EXTREME_COLUMNS)
+        headings = (f"{n} {t}".strip() for n, t in zip(_EXTREME_COLUMNS, times, strict=True))
+        table.writerow(["quantity", "column", *headings])
+        for name in names:
+            values = dataset[PREFIX + name].values.reshape(len(ROWS), -1)[taken].T
+            for column, row in zip(_columns(dataset[name]), values.tolist(), strict=True):
+                table.writerow([name, csv_cell(column), *("" if v != v else v for v in row)])
+
+
 def write_csv(
     dataset: xr.Dataset, path: str | os.PathLike[str], quantity: str | None
 ) -> list[Path]:
     target = Path(os.path.abspath(path))
     tables: dict[str, list[str]] = {}
     for key, variable in dataset.data_vars.items():
-        if "time" not in variable.dims:  # extremes: `summary` and `envelope` are their tables
+        if "time" not in variable.dims:  # extremes
             continue
         tables.setdefault(_GROUPS.get(str(key), str(key)), []).append(str(key))
     if quantity is not None and quantity in itertools.chain(*tables.values()):
@@ -146,4 +163,8 @@ def write_csv(
     for name, names in wanted.items():
         written.append(target / f"{name}.csv")
         _write_table(dataset, names, written[-1])
+    bounded = [name for name in itertools.chain(*wanted.values()) if PREFIX + name in dataset]
+    if bounded:
+        written.append(target / "extremes.csv")
+        _write_extremes(dataset, bounded, written[-1])
     return written

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from linkwise._core import InputError
 from linkwise.base import printable
+from linkwise.loads.extremes import missed_peaks
 from linkwise.loads.peaks import peak_loads
 from linkwise.notes import recorded_warnings, warning_lines
 from linkwise.plot.run_figures import RunPlots
@@ -148,10 +150,19 @@ class Run:
         """Write tables with a row per sample and a column per scalar, the first one `time [s]`.
 
         Args:
-            path: A folder, which gets one file per quantity, or a `.csv` file for one quantity.
+            path: A folder, which gets one file per quantity, and `extremes.csv` where the run holds
+                them: the smallest and the largest value of each column, between the samples too.
+                Or a `.csv` file for one quantity; UserWarning where its samples miss peaks of the
+                loads.
             quantity: Which one, when `path` is a file: a variable's name, "energy" or "statistics".
 
         Returns:
             The files written.
         """
-        return write_csv(self.dataset, path, quantity)
+        written = write_csv(self.dataset, path, quantity)
+        if quantity == "joint_load" and len(written) == 1:
+            missed = missed_peaks(self)
+            if missed:
+                text = f"{written[0].name}: {missed[0]}; a folder gets extremes.csv as well"
+                warnings.warn(text, UserWarning, stacklevel=2)
+        return written

@@ -15,6 +15,7 @@ from linkwise.base import Array, rows_per_block
 from linkwise.io.complaint import near, shorten
 from linkwise.io.load import load
 from linkwise.io.urdf_visuals import Appearance, read_appearance
+from linkwise.loads.extremes import loads_at_peaks, missed_peaks
 from linkwise.loads.samples import held_model, model_of, rows
 from linkwise.notes import plain_warnings, warnings_of
 from linkwise.record.model import read_model
@@ -114,16 +115,20 @@ class Recording:
         return np.asarray(self._loads[row])
 
     def history(self, joint: int, most: int) -> tuple[Array, Array]:
-        """Times (n,) and loads (n, 6) of one joint, at most `most` evenly spaced samples.
+        """Times (n,) and loads (n, 6) of one joint: at most `most` evenly spaced samples, and what
+        the run holds of its largest force and moment between them.
 
-        Of the chosen causes, like `load`.
+        Of chosen causes, like `load`, the samples alone.
         """
         chosen = np.unique(np.linspace(0, self.times.size - 1, most).astype(int))
         if self.causes is not None and not self.causes.everything:
             chosen, loads = self.causes.history(joint, chosen)
             return self.times[chosen], loads
         load = self._run.dataset["joint_load"].transpose("time", "joint", "component")[:, joint]
-        return self.times[chosen], np.asarray(load.values[chosen])
+        times, loads = self.times[chosen], np.asarray(load.values[chosen])
+        peak_times, peaks = loads_at_peaks(self._run, joint)
+        order = np.argsort(np.concatenate([times, peak_times]), kind="stable")
+        return np.concatenate([times, peak_times])[order], np.concatenate([loads, peaks])[order]
 
 
 @dataclass(frozen=True)
@@ -214,6 +219,9 @@ def _open_run(path: Path, options: Options) -> Source:
         recording.causes.choose(options.causes)
     ratings = _ratings(options, str(run.dataset.attrs.get("scenario", "")))
     notes = _notes(appearance)
+    missed = missed_peaks(run) if options.loads else []
+    if missed:
+        notes.append(f"arrows and colours are of the samples: {missed[0]}")
     return Source(model.name, model, appearance, recording, ratings, notes, run.warnings)
 
 

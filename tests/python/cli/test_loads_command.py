@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
-from helpers.machines import stopped_rod
+from helpers.machines import stopped_arm, stopped_rod
 
 MOTION = """[drive.elbow]
 kind = "motion"
@@ -319,3 +319,54 @@ def test_only_the_joints_asked_for_are_warned_of(linkwise, tmp_path):
     for options in ([], ["-j", "stopped hinge"], ["-j", "stopped flange"]):
         (said,) = between_lines(linkwise, store, *options)
         assert "'stopped hinge'" in said
+
+
+@pytest.fixture
+def blow(tmp_path):
+    """A run whose samples miss most of a blow on a stiff stop."""
+    store = tmp_path / "blow.zarr"
+    run = lw.simulate(stopped_arm(1e7), duration=1.0, every=0.1, output=store)
+    return str(store), lw.loads.peak_loads(run)
+
+
+def test_the_table_says_whose_peaks_it_shows(linkwise, blow, tmp_path):
+    store, peaks = blow
+    shown = linkwise("loads", store)
+    assert "of the samples" not in shown.out + shown.err
+    assert f"{float(peaks.moment.sel(joint='shoulder')):.4g}" in shown.out
+    in_full = linkwise("loads", store, "-j", "shoulder")
+    assert "rms and duty of the samples" in in_full.out
+    assert "mean, RMS and duty are of the samples: moment of joint 'shoulder'" in in_full.err
+    told = linkwise("loads", store, "--json").json
+    assert told["extremes"] == "along the steps"
+    assert any("peaks between the samples" in w["text"] for w in told["warnings"])
+    lw.simulate(stopped_arm(1e7), duration=1.0, every=0.1, output=tmp_path / "s", extremes=False)
+    for options in ([], ["-j", "shoulder"]):
+        assert "of the samples (the run holds no extremes)" in linkwise("loads", "s", *options).out
+
+
+def test_shares_beside_a_peak_say_so(linkwise, tmp_path):
+    """Of machines of many joints the run holds no states at the peaks."""
+    lw.simulate(lw.scenes.chain(51), duration=0.3, every=0.3, output=tmp_path / "c.zarr")
+    shown = linkwise("loads", "c.zarr", "--split", "force").out
+    assert "of loads marked * at the sample beside it" in shown
+    assert " * " in shown
+
+
+def test_the_report_and_the_view_say_what_samples_miss(linkwise, blow, tmp_path):
+    pytest.importorskip("plotly")
+    from linkwise.view.source import Options, open_source
+
+    store, peaks = blow
+    text = f"peaks between the samples, at {float(peaks.moment.sel(joint='shoulder')):.4g} N m"
+    assert linkwise("loads", store, "--html", "report.html").code == 0
+    written = (tmp_path / "report.html").read_text()
+    assert written.count(text) == 2
+    assert "Of the whole motion, between the samples too." in written
+    source = open_source(store, Options())
+    assert any("arrows and colours are of the samples" in n and text in n for n in source.notes)
+    times, loads = source.recording.history(0, 500)
+    assert np.linalg.norm(loads[:, 3:], axis=1).max() == pytest.approx(float(peaks.moment[0]))
+    assert float(times[np.linalg.norm(loads[:, 3:], axis=1).argmax()]) == float(
+        peaks.moment_time[0]
+    )

@@ -1,5 +1,7 @@
 """Extremes between the samples: closed forms, any sampling, every way that a run can end."""
 
+import csv
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -193,8 +195,14 @@ def test_stored_exported_and_read_again(tmp_path):
         for name in (n for n in memory.dataset.data_vars if str(n).startswith("extreme_")):
             np.testing.assert_array_equal(memory[name].values, again[name].values)
             np.testing.assert_array_equal(memory[name].values, exported[name].values)
-    written = {path.stem for path in memory.to_csv(tmp_path / "tables")}
-    assert not any(name.startswith("extreme_") for name in written)
+    assert (tmp_path / "tables" / "extremes.csv") in memory.to_csv(tmp_path / "tables")
+    with open(tmp_path / "tables" / "extremes.csv", newline="") as file:
+        table = {row["column"]: row for row in csv.DictReader(file) if "load" in row["quantity"]}
+    envelope = lw.loads.envelope(memory)
+    for key in ("minimum", "maximum"):
+        assert float(table["elbow.ny [N m]"][key]) == float(
+            envelope[key].sel(joint="elbow", component="ny")
+        )
     xr.testing.assert_identical(lw.loads.summary(memory), lw.loads.summary(again))
 
 
@@ -286,3 +294,30 @@ def test_a_run_that_is_killed_has_what_was_found_until_then(tmp_path):
     assert 1000 < count < 9001
     assert float(between.minimum[0]) <= position.min() * (1 - 1e-12)
     assert between.minimum[0] > -np.pi
+
+
+def test_what_shows_samples_says_what_they_miss(tmp_path):
+    run = lw.simulate(stopped_arm(1e7), duration=1.0, every=0.1)
+    peak = float(lw.loads.peak_loads(run).moment.sel(joint="shoulder"))
+    text = f"moment of joint 'shoulder' peaks between the samples, at {peak:.4g} N m"
+    for made in (
+        lw.loads.in_frame(run, "world"),
+        lw.loads.in_frame(run, "world", joint="shoulder"),
+        lw.loads.split(run),
+        lw.loads.quantities(run),
+        lw.loads.spectrum(run, "shoulder", "fx"),
+        lw.loads.load_duration(run, "shoulder", "force"),
+        lw.loads.damage_equivalent(run, joints=["shoulder"]),
+    ):
+        assert text in made.attrs["samples"]
+    with pytest.warns(UserWarning, match=r"loads.csv: moment of joint 'shoulder' peaks between"):
+        run.to_csv(tmp_path / "loads.csv", "joint_load")
+    found = lw.loads.summary(run)
+    shown = np.linalg.norm(run.joint_load.values[..., 3:], axis=-1).max(axis=0)
+    expected = 1 - shown / found.peak.sel(quantity="moment")
+    np.testing.assert_allclose(found.missed.sel(quantity="moment"), expected, rtol=1e-12)
+    assert np.isnan(lw.loads.summary(swing(extremes=False)).missed).all()
+    assert "not known" in lw.loads.quantities(swing(extremes=False)).attrs["samples"]
+    assert lw.loads.quantities(swing()).attrs["samples"] == (
+        "the samples show every peak of force and moment to 1%"
+    )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
-from helpers.machines import pendulum
+from helpers.machines import pendulum, stopped_arm
 
 pytest.importorskip("matplotlib", reason="plots need matplotlib: pip install '.[plot]'")
 
@@ -71,3 +71,17 @@ def test_a_run_that_lacks_the_quantity_says_so(draw, quantity):
 def test_unknown_joints_are_named(swing):
     with pytest.raises(lw.InputError, match="did you mean 'elbow'"):
         swing.plot.loads("elbw")
+
+
+def test_a_blow_between_the_samples_is_in_the_figures():
+    run = lw.simulate(stopped_arm(1e7), duration=1.0, every=0.05)
+    found = lw.loads.envelope(run).sel(joint="elbow")
+    for axis, names in zip(
+        run.plot.loads("elbow").axes, (("fx", "fy", "fz"), ("nx", "ny", "nz")), strict=True
+    ):
+        dots = [line.get_xydata() for line in axis.get_lines() if line.get_marker() == "o"]
+        for drawn, name in zip(dots, names, strict=True):
+            one = found.sel(component=name)
+            expected = [[one.minimum_time, one.minimum], [one.maximum_time, one.maximum]]
+            np.testing.assert_array_equal(drawn, np.array(expected, dtype=float))
+    assert "peaks between the samples" in run.plot.split("elbow").axes[0].get_title()
