@@ -105,16 +105,20 @@ def loads(
     ignored = opened.warnings
     if joint or csv or as_json:  # whose mean, RMS and duty are of the samples
         ignored = ignored + sampling_warnings(opened, joint)
+    extremes = found["summary"].attrs["extremes"]
     if as_json:
-        how = found["summary"].attrs["extremes"]
-        about = {"run": str(run), "extremes": how, "peaks": records, "split": shares}
+        about = {"run": str(run), "extremes": extremes, "peaks": records, "split": shares}
         print_json(about | {"warnings": ignored})
         return
+    _show(tables(records, shares, joint, extremes), ignored, [csv, html])
+
+
+def _show(made: list[Any], ignored: list[dict[str, str]], written: list[Path | None]) -> None:
     screen = console()
-    for made in tables(records, shares, joint, found["summary"].attrs["extremes"]):
-        screen.print(made)
+    for one in made:
+        screen.print(one)
     say_warnings(ignored)
-    for path in (csv, html):
+    for path in written:
         if path is not None:
             screen.print(f"Written: {path}", markup=False)
 
