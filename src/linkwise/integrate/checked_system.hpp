@@ -26,10 +26,14 @@ class CheckedSystem {
 
   Outcome evaluate(double t, const double* y, double* ydot) {
     ++evaluations;
-    t = std::clamp(t, earliest_, std::max(earliest_, latest_));
-    const Outcome outcome = system_->evaluate(t, y, ydot);
+    const Outcome outcome = system_->evaluate(within_step(t), y, ydot);
     if (outcome != Outcome::converged) return outcome;
     return all_finite({ydot, size()}) ? Outcome::converged : Outcome::not_finite;
+  }
+
+  /// Neither counted nor remembered.
+  Outcome evaluate_aside(double t, const double* y, double* ydot) {
+    return system_->evaluate_aside(within_step(t), y, ydot);
   }
 
   std::size_t size() const { return static_cast<std::size_t>(system_->size()); }
@@ -46,6 +50,10 @@ class CheckedSystem {
   static double beside(double t, double towards) {
     for (int k = 0; k < 4; ++k) t = std::nextafter(t, towards);
     return t;
+  }
+
+  double within_step(double t) const {
+    return std::clamp(t, earliest_, std::max(earliest_, latest_));
   }
 
   double earliest_ = -infinity, latest_ = infinity;

@@ -10,6 +10,7 @@ namespace linkwise {
 
 using MakeIntegrator = std::unique_ptr<Integrator>(OdeSystem&, const IntegratorOptions&);
 MakeIntegrator make_auto, make_adams, make_bdf, make_runge_kutta_4, make_semi_implicit_euler;
+MakeIntegrator make_runge_kutta_8;
 
 namespace {
 
@@ -24,6 +25,9 @@ constexpr IntegratorEntry entries[] = {
      "and stops",
      false, 5, make_bdf},
 #endif
+    {"runge_kutta_8",
+     "Runge-Kutta of order 8 (Dormand and Prince); without a history, to check the others by",
+     false, 8, make_runge_kutta_8},
     {"runge_kutta_4", "classical Runge-Kutta of order 4 with a fixed step; no error control", true,
      4, make_runge_kutta_4},
     {"semi_implicit_euler", "semi-implicit Euler of order 1 with a fixed step; no error control",

@@ -69,7 +69,7 @@ TEST_P(EveryIntegrator, FollowsTheClosedForm) {
   integrator->start(0.0, ForcedOscillator::initial());
   const std::vector<double> y = integrate_to(*integrator, 3.0, 2);
   EXPECT_LT(ForcedOscillator::error(3.0, y), entry().highest_order == 1 ? 1e-3 : 1e-4);
-  EXPECT_GT(integrator->statistics().steps, 10);
+  EXPECT_GE(integrator->statistics().steps, 10);
   EXPECT_GE(integrator->statistics().evaluations, integrator->statistics().steps);
   EXPECT_GE(integrator->statistics().last_order, 1);
   EXPECT_LE(integrator->statistics().last_order, entry().highest_order);

@@ -17,6 +17,7 @@
 
 #include "linkwise/base/assert.hpp"
 #include "linkwise/integrate/checked_system.hpp"
+#include "linkwise/integrate/error_scale.hpp"
 #include "linkwise/integrate/sundials/handles.hpp"
 #include "linkwise/integrate/sundials/newton_cost.hpp"
 
@@ -26,9 +27,6 @@ namespace {
 using namespace sundials;
 
 constexpr int krylov_dimension = 30;
-
-/// Steps whose error is to stay below this share of a value fail for rounding alone.
-constexpr double rounding = 64 * std::numeric_limits<double>::epsilon();
 
 /// A stop time that is not reached.
 constexpr double never = 1e300;
@@ -179,17 +177,11 @@ Outcome Cvode::project(double t, const double* y) {
 /// this is where the step is made to start from the projected state.
 int Cvode::error_weights(N_Vector y, N_Vector weight, void* self) {
   Cvode& cvode = *static_cast<Cvode*>(self);
-  const IntegratorOptions& o = cvode.options_;
   double* value = N_VGetArrayPointer(y);
   if (std::exchange(cvode.write_back_, false)) std::ranges::copy(cvode.state_, value);
   double* own = N_VGetArrayPointer(weight);
-  N_VConst(0.0, weight);
-  cvode.system_->error_scale(value, own);
-  N_VScale(o.relative_tolerance > 0.0 ? o.relative_tolerance : o.tolerance, weight, weight);
-  N_VAddConst(weight, o.absolute_tolerance > 0.0 ? o.absolute_tolerance : o.tolerance, weight);
-  // Nothing is held better than rounding lets it be: angles after millions of turns.
-  for (std::size_t i = 0; i < cvode.size(); ++i)
-    own[i] = std::max(own[i], rounding * std::abs(value[i]));
+  N_VConst(1.0, weight);
+  tolerated_errors(*cvode.system_, cvode.options_, {value, cvode.size()}, own);
   N_VInv(weight, weight);
   return 0;
 }
