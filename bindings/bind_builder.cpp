@@ -62,6 +62,27 @@ void add_loop(ModelBuilder& builder, std::string name, const std::string& type, 
   builder.add_loop_joint(std::move(loop), type, pitch, properties_from(properties));
 }
 
+void add_rod(ModelBuilder& builder, std::string name, std::string parent, std::string child,
+             double length, nb::handle point, nb::handle child_point) {
+  LoopJointSpec loop;
+  loop.joint.name = std::move(name);
+  loop.joint.parent = std::move(parent);
+  loop.joint.child = std::move(child);
+  if (!point.is_none()) loop.joint.translation = vec3(point, "point");
+  if (!child_point.is_none()) loop.child_translation = vec3(child_point, "child_point");
+  builder.add_rod(std::move(loop), length);
+}
+
+void add_coupling(ModelBuilder& builder, std::string name, const nb::dict& factors, double offset) {
+  CouplingSpec coupling;
+  coupling.name = std::move(name);
+  coupling.offset = offset;
+  for (auto [joint, factor] : factors)
+    coupling.terms.push_back(
+        {name_in(nb::borrow(joint), "a coupled joint"), real_number(factor, "factor")});
+  builder.add_coupling(std::move(coupling));
+}
+
 /// A chain of equal links made without Python objects: N in the millions.
 PyModel* chain_of(size_t n, const std::string& joint, nb::handle axes, nb::handle translation,
                   double mass, nb::handle com, nb::handle inertia, nb::handle gravity,
@@ -171,7 +192,33 @@ Args:
         two frames are one.
 
 Raises:
-    InputError: as add_joint.)");
+    InputError: as add_joint.)")
+      .def("add_rod", &add_rod, "name"_a, "parent"_a, "child"_a, nb::kw_only(), "length"_a,
+           "point"_a = nb::none(), "child_point"_a = nb::none(),
+           R"(Adds a rod without mass between a ball on each of two links: it keeps the distance of
+two points, and its only load is its force along the line between them.
+
+Args:
+    name: unique among joints.
+    parent, child: names of links, or the root link for the ground.
+    length: [m], more than 0.
+    point, child_point: (3,) in the links' frames [m]; None: their origins.
+
+Raises:
+    InputError: the length is not more than 0, or an array has another shape.)")
+      .def("add_coupling", &add_coupling, "name"_a, "factors"_a, nb::kw_only(), "offset"_a = 0.0,
+           R"(Ties coordinates of joints together, as gears, racks, screws and differentials do.
+
+The sum of factor times coordinate is offset at all times. The coupling's load, one number, acts on
+each joint as the torque or force factor times load.
+
+Args:
+    name: unique among couplings.
+    factors: that of each joint, by its name; joints of one degree of freedom [rad, m].
+    offset: what the sum is.
+
+Raises:
+    InputError: a factor is not a number; what concerns the joints, build checks.)");
 }
 
 }  // namespace

@@ -53,6 +53,10 @@ ModelSpec from_bytes(const nb::bytes& description) {
   };
   for (const JointSpec& joint : spec.joints) check_joint(joint);
   for (const LoopJointSpec& loop : spec.loop_joints) check_joint(loop.joint);
+  for (const CouplingSpec& coupling : spec.couplings) {
+    check_text(coupling.name);
+    for (const CouplingSpec::Term& term : coupling.terms) check_text(term.joint);
+  }
   return spec;
 }
 

@@ -29,8 +29,8 @@ TARGETS: tuple[str, ...]
 
 # Parameters that a binding takes as a Python object, by their name.
 ARRAYS = (
-    "acceleration axes axis breakpoints child_rotation child_translation com directions external f "
-    "gravity guess inertia initial "
+    "acceleration axes axis breakpoints child_point child_rotation child_translation com "
+    "directions external f gravity guess inertia initial point "
     "origin prescribed q q0 rotation target tau times translation v v0 value values"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
@@ -40,6 +40,7 @@ PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "body": "str | int",
     "frame": "str | Frame",
     "samples": "tuple[npt.ArrayLike, npt.ArrayLike]",
+    "factors": "dict[str, float]",
     "fn": "Callable[..., Any]",
     "mass": "float",
     "options": "Any",

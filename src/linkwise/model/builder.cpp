@@ -135,6 +135,15 @@ void ModelBuilder::add_loop_joint(LoopJointSpec loop, const std::string& type, d
   spec_.loop_joints.push_back(std::move(loop));
 }
 
+void ModelBuilder::add_rod(LoopJointSpec loop, double length) {
+  if (!(length > 0))
+    throw InputError("rod '" + loop.joint.name + "'" + source_of(spec_) + ": length is " +
+                     number_text(length) + "; give the length of the rod in m, more than 0");
+  loop.joint.type = JointType::fixed;
+  loop.rod_length = length;
+  spec_.loop_joints.push_back(std::move(loop));
+}
+
 void ModelBuilder::add_note(const std::string& level, std::string element, std::string text) {
   spec_.notes.push_back({note_level_from_name(level), std::move(element), std::move(text)});
 }

@@ -38,6 +38,11 @@ class ModelBuilder {
   void add_loop_joint(LoopJointSpec loop, const std::string& type, double pitch,
                       Properties properties);
 
+  /// A rod of this length [m] without mass between the points of `loop`; 0 and less throw
+  /// InputError.
+  void add_rod(LoopJointSpec loop, double length);
+  void add_coupling(CouplingSpec coupling) { spec_.couplings.push_back(std::move(coupling)); }
+
   /// level: "merge", "warning" or "info".
   void add_note(const std::string& level, std::string element, std::string text);
   void set_floating_base(std::string joint_name);

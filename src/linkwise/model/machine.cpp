@@ -138,8 +138,9 @@ Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::s
       throw InputError("joint '" + j.name + "'" + where + ": link '" + j.child +
                        "' is its parent and its child; give it two links");
     const bool closes = i >= static_cast<int>(spec.joints.size());
-    graph.joints.push_back(
-        {parent, child, joint_dof(j), acts(j), !closes && j.type == JointType::fixed, closes});
+    const bool is_rod = closes && spec.loop_joints[i - spec.joints.size()].rod_length > 0;
+    graph.joints.push_back({parent, child, is_rod ? 5 : joint_dof(j), acts(j),
+                            !closes && j.type == JointType::fixed, closes});
   }
   if (spec.keep_fixed) {
     const std::vector<char> carries = links_that_carry(graph);

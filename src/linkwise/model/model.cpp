@@ -4,6 +4,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/model/hinge_frames.hpp"
+#include "linkwise/model/place_couplings.hpp"
 #include "linkwise/model/place_loops.hpp"
 #include "linkwise/model/undetermined.hpp"
 #include "linkwise/model/validate.hpp"
@@ -67,6 +68,7 @@ Model::Model(ModelSpec given) : spec_(std::move(given)) {
     has_passive_ |=
         std::any_of(dof_values(p).begin(), dof_values(p).end(), [](double x) { return x > 0; });
   for (const std::string& name : spec_.prescribed) joint_index(name);
+  couplings = place_couplings(*this);
 }
 
 int Model::joint_index(const std::string& name) const {
@@ -163,6 +165,10 @@ std::vector<int> Model::joint_parents() const {
 }
 
 void refuse_loops(const Model& model, const std::string& who) {
+  if (model.n_couplings() > 0)
+    throw InputError("model '" + model.spec().name + "'" + model.where() + ": coupling '" +
+                     model.couplings.front().name + "' ties joints together, and " + who +
+                     " takes none; remove the coupling");
   if (model.n_loops() == 0) return;
   throw InputError("model '" + model.spec().name + "'" + model.where() + ": joint '" +
                    model.loops.joints.front().joint.name + "' closes a loop, and " + who +

@@ -91,6 +91,7 @@ struct LoopJoint {
   int parent_link = 0;
   Transform<double> on_parent;  ///< parent's body frame -> E, the joint's axes as given
   Transform<double> on_child;   ///< child's body frame -> F, which is the last element's frame
+  double rod_length = 0;        ///< of a rod between the origins of E and F, m; 0: a joint
 };
 
 /// All of them. Their coordinates, rates and properties are counted apart from the tree's.
@@ -99,6 +100,19 @@ struct LoopJoints {
   std::vector<Element> elements;  ///< the first one of a joint is placed in E
   std::array<std::vector<double>, n_dof_properties> dof;
   int nq = 0, nv = 0;
+};
+
+/// Sum of factor times coordinate = offset.
+struct Coupling {
+  struct Term {
+    int joint;  ///< of the tree
+    int body;   ///< that the joint belongs to
+    int q, v;   ///< its coordinate and rate
+    double factor;
+  };
+  std::string name;
+  std::vector<Term> terms;
+  double offset = 0;
 };
 
 /// Where a link of the file is: on which joint's frame (-1: ground), and how it is placed there.
@@ -120,6 +134,7 @@ class Model {
   /// Of the tree.
   int n_joints() const { return static_cast<int>(joints.size()); }
   int n_loops() const { return static_cast<int>(loops.joints.size()); }
+  int n_couplings() const { return static_cast<int>(couplings.size()); }
   double total_mass() const { return total_mass_; }
   /// Index of a joint or throws InputError with the nearest names.
   int joint_index(const std::string& name) const;
@@ -155,6 +170,7 @@ class Model {
   std::vector<JointInfo> joints;
   std::vector<LinkInfo> links;
   LoopJoints loops;
+  std::vector<Coupling> couplings;
   std::vector<Note> notes;
   /// One array of length nv for each property of dof_property_table.
   std::array<std::vector<double>, n_dof_properties> dof;
@@ -175,7 +191,7 @@ class Model {
   NameIndex joint_by_name_, link_by_name_;
 };
 
-/// Throws InputError where the model has loops: `who` takes none.
+/// Throws InputError where the model has loops or couplings: `who` takes none.
 void refuse_loops(const Model& model, const std::string& who);
 
 /// The bodies of a range, whose kind is known while compiling.

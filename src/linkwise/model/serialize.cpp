@@ -149,13 +149,24 @@ void spec_fields(A& archive, Spec& spec) {
     archive.raw(loop.joint.initial.data(), loop.joint.initial.size() * sizeof(double));
     archive.raw(loop.child_rotation.m, sizeof(loop.child_rotation.m));
     archive.raw(&loop.child_translation.x, 3 * sizeof(double));
+    archive.raw(&loop.rod_length, sizeof(double));
+  }
+  archive.size(spec.couplings);
+  for (auto& coupling : spec.couplings) {
+    text(archive, coupling.name);
+    archive.size(coupling.terms);
+    for (auto& term : coupling.terms) {
+      text(archive, term.joint);
+      archive.raw(&term.factor, sizeof(double));
+    }
+    archive.raw(&coupling.offset, sizeof(double));
   }
 }
 
 }  // namespace
 
 std::string serialize(const ModelSpec& spec) {
-  Writer writer(!spec.loop_joints.empty());
+  Writer writer(!spec.loop_joints.empty() || !spec.couplings.empty());
   spec_fields(writer, spec);
   return std::move(writer.bytes);
 }

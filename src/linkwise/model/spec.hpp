@@ -115,6 +115,21 @@ struct LoopJointSpec {
   Mat3<double> child_rotation =
       Mat3<double>::identity();    ///< joint axes in the child link frame (columns)
   Vec3<double> child_translation;  ///< joint point in the child link frame, m
+  /// Of a rod without mass between two balls, m: all that it holds is the distance of the two
+  /// points. 0: a joint. A rod's joint is of type fixed, which has no coordinates.
+  double rod_length = 0;
+};
+
+/// Coordinates of joints with one degree of freedom that go together, as gears, racks and
+/// differentials make them: sum of factor times coordinate = offset.
+struct CouplingSpec {
+  struct Term {
+    std::string joint;
+    double factor;  ///< of its coordinate [rad, m]
+  };
+  std::string name;
+  std::vector<Term> terms;
+  double offset = 0;
 };
 
 enum class NoteLevel { merge, warning, info };
@@ -136,6 +151,7 @@ struct ModelSpec {
   std::vector<LinkSpec> links;
   std::vector<JointSpec> joints;
   std::vector<LoopJointSpec> loop_joints;
+  std::vector<CouplingSpec> couplings;
   std::vector<Note> notes;  ///< of whoever read the model from a file
 };
 

@@ -115,6 +115,9 @@ void validate(ModelSpec& spec, std::vector<Note>& notes) {
     if (!finite(loop.child_translation))
       throw InputError(head + "child_translation is not finite; give three finite numbers in m");
     require_rotation(loop.child_rotation, head + "child_rotation");
+    if (!std::isfinite(loop.rod_length) || loop.rod_length < 0)
+      throw InputError(head + "length is " + number_text(loop.rod_length) +
+                       "; give the length of the rod in m, more than 0");
   }
 }
 

@@ -21,7 +21,8 @@ ModelSpec full_spec() {
   spec.links.push_back(random_link("tip", draws));
   spec.joints.push_back(random_joint(JointType::revolute, "j", "base", "tip", draws));
   spec.loop_joints = {{random_joint(JointType::universal, "loop", "link1", "tip", draws),
-                       random_rotation(draws), random_vector3(draws)}};
+                       random_rotation(draws), random_vector3(draws), 0}};
+  spec.couplings = {{"gear", {{"joint0", 2}, {"j", -1}}, 0.5}};
   spec.joints[0].dof = {{DofProperty::lower, {-infinity, -1, 0}}, {DofProperty::armature, {0.5}}};
   return spec;
 }
@@ -45,6 +46,9 @@ TEST(Serialize, ComesBackAsItWas) {
   EXPECT_EQ(back.loop_joints[0].joint.child, "tip");
   EXPECT_EQ(back.loop_joints[0].child_rotation.m[7], spec.loop_joints[0].child_rotation.m[7]);
   EXPECT_EQ(back.loop_joints[0].child_translation.z, spec.loop_joints[0].child_translation.z);
+  ASSERT_EQ(back.couplings.size(), 1u);
+  EXPECT_EQ(back.couplings[0].terms[1].joint, "j");
+  EXPECT_EQ(back.couplings[0].offset, 0.5);
 }
 
 TEST(Serialize, CutShortAnywhereIsAnInputError) {
