@@ -67,6 +67,7 @@ def contestants(members: int) -> dict[str, tuple[int, Callable[[int], Array]]]:
             step=STEP,
             threads=1,
             record=("position", *quantities),
+            extremes=False,  # the peers search no peaks
         )
         return np.asarray(batch.position.values[:, 0])
 

@@ -130,8 +130,14 @@ def test_a_member_that_fails_ends_alone():
 
 
 def test_only_what_is_asked_for_is_recorded():
-    batch = lw.simulate_batch(machine(), step=1e-2, duration=0.1, record=["joint_load", "energy"])
+    options = {"step": 1e-2, "duration": 0.1, "record": ["joint_load", "energy"]}
+    batch = lw.simulate_batch(machine(), **options, extremes=False)
     assert set(batch.data_vars) == {"joint_load", "kinetic_energy", "potential_energy"}
+    kept = {"extreme_quantity", "extreme_joint_load", "extreme_wrench"}
+    assert set(lw.simulate_batch(machine(), **options).data_vars) == set(batch.data_vars) | kept
+    assert list(lw.simulate_batch(machine(), step=1e-2, duration=0.1, record=["position"])) == [
+        "position"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -187,13 +193,3 @@ def test_members_that_simulations_cannot_share_evenly():
         _core.simulate_members(
             simulations, q0=rows, v0=rows, tau=None, times=[0.0], quantities=["position"]
         )
-
-
-def test_loads_of_a_batch_are_those_of_its_members():
-    model = lw.scenes.chain(3)
-    batch = lw.simulate_batch(model, q0=np.zeros((2, 3)), duration=0.1, step=0.01)
-    for use in (lw.loads.summary, lw.loads.envelope, lw.loads.energy_balance, lw.loads.quantities):
-        with pytest.raises(lw.InputError, match=r"is a Dataset; give a linkwise\.Run\. One member"):
-            use(batch)
-    member = lw.loads.summary(lw.Run(batch.isel(member=1), model=model))
-    assert np.isfinite(member.peak.sel(quantity="force")).all()

@@ -78,29 +78,22 @@ def sweep(
 
 def member_records(found: xr.Dataset, keys: list[str]) -> list[dict[str, Any]]:
     """Per member its values, how it went, and the largest force and moment and where."""
-    import numpy as np
+    from linkwise.base import HALVES
+    from linkwise.loads import peak_loads
 
-    from linkwise.base import HALVES, lengths
-    from linkwise.loads.extremes import extremes_of, quantity_rows
-    from linkwise.results import Run
-
+    peaks = peak_loads(found) if "joint_load" in found else None
     records = []
     for k in range(found.sizes["member"]):
         member = found.isel(member=k)
         record: dict[str, Any] = {key: member[key].values.tolist() for key in keys}
         record["outcome"] = str(member["outcome"].values)
-        for half, _, components in HALVES:
-            if "joint_load" not in found:
+        for half, _, _ in HALVES:
+            if peaks is None:
                 continue
-            load = member["joint_load"].sel(component=list(components))
-            size = lengths(load.transpose("time", "joint", "component").values)
-            peaks = np.fmax.reduce(size, axis=0)
-            between = extremes_of(Run(member), "quantity")
-            if between is not None:
-                peaks = np.fmax(peaks, between.maximum[quantity_rows([half])[0]])
-            at = int(np.nanargmax(peaks))
+            own = peaks[half].isel(member=k).values
+            at = int(own.argmax())  # of NaN, where a member has no samples
             record |= {
-                f"largest_{half}": float(peaks[at]),
+                f"largest_{half}": float(own[at]),
                 f"{half}_joint": str(found["joint"].values[at]),
             }
         records.append(record)

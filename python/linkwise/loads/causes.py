@@ -17,6 +17,7 @@ from linkwise.loads.extremes import (
     states_at_peaks,
     what_samples_miss,
 )
+from linkwise.loads.members import each_member
 from linkwise.loads.peaks import peak_loads
 from linkwise.loads.samples import (
     drive_kinds,
@@ -170,6 +171,7 @@ class Split:
         return shares
 
 
+@each_member
 def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.DataArray:
     """Joint loads by cause; the shares add up to the joint load to rounding.
 
@@ -211,6 +213,7 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
     )
 
 
+@each_member
 def split_at_peaks(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Dataset:
     """What each cause adds to the largest force and the largest moment of every joint.
 

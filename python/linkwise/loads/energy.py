@@ -8,6 +8,7 @@ import numpy as np
 
 from linkwise import _core
 from linkwise.base import Array
+from linkwise.loads.members import each_member
 from linkwise.loads.samples import external, model_of, need_whole, rows
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ def _sampled_works(run: RunLike, model: Model) -> dict[str, Array]:
     }
 
 
+@each_member
 def energy_balance(run: RunLike, model: Model | None = None) -> xr.Dataset:
     """Energy, the work that went in, and what does not add up.
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from linkwise.base import DERIVED, Array, lengths
 from linkwise.loads.extremes import what_samples_miss
+from linkwise.loads.members import each_member
 from linkwise.loads.samples import Selection, joint_names, model_of, need, rows, select
 
 if TYPE_CHECKING:
@@ -141,6 +142,7 @@ def _drive_energy(run: RunLike, found: Selection, power: Array) -> tuple[Array, 
     return cumulative_simpson(power, x=times, axis=0, initial=0), "by Simpson's rule"
 
 
+@each_member
 def quantities(run: RunLike, model: Model | None = None) -> xr.Dataset:
     """Engineering quantities over time and joint, each with its convention in `attrs`.
 

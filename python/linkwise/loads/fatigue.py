@@ -16,6 +16,7 @@ from linkwise.base import COMPONENTS, Array
 from linkwise.io.complaint import check_one_of, shown
 from linkwise.loads.engineering import QUANTITIES, derive, drive_power, has_power, joint_directions
 from linkwise.loads.extremes import extremes_of, quantity_rows, what_samples_miss
+from linkwise.loads.members import each_member
 from linkwise.loads.samples import (
     joint_names,
     joint_position,
@@ -134,6 +135,7 @@ def equivalent(ranges: Array, counts: Array, exponent: float, repetitions: float
     return float(largest * (scaled / repetitions) ** (1 / exponent))
 
 
+@each_member
 def damage_equivalent(
     run: RunLike,
     exponents: Sequence[float] = EXPONENTS,

@@ -13,6 +13,7 @@ from linkwise._core import Frame, InputError, as_floats
 from linkwise.base import Array
 from linkwise.io.complaint import check_one_of, near, shown
 from linkwise.loads.extremes import what_samples_miss
+from linkwise.loads.members import each_member
 from linkwise.loads.samples import model_of, need_whole, rows
 from linkwise.loads.welds import Weld
 
@@ -166,7 +167,7 @@ def _as_point(point: npt.ArrayLike | None, joints: int) -> Array | None:
 
 @overload
 def in_frame(
-    run: RunLike,
+    run: RunLike | xr.Dataset,
     frame: str | Frame = ...,
     *,
     joint: str | Sequence[str] | None = ...,
@@ -186,7 +187,7 @@ def in_frame(
     q: npt.ArrayLike,
 ) -> Array: ...
 def in_frame(
-    run: RunLike | npt.ArrayLike,
+    run: RunLike | xr.Dataset | npt.ArrayLike,
     frame: str | Frame = "world",
     *,
     joint: str | Sequence[str] | None = None,
@@ -223,7 +224,7 @@ def in_frame(
         InputError: the frame or joint is unknown, shapes are wrong, the run lacks a quantity, or
             wrenches act on both sides of a merged joint.
     """
-    if not hasattr(run, "dataset"):
+    if not (hasattr(run, "dataset") or hasattr(run, "data_vars")):
         if model is None or q is None:
             raise InputError("loads in an array need their machine and state; give model and q")
         names = list(model.joint_names) if joint is None else _names(joint)
@@ -235,6 +236,7 @@ def in_frame(
     return _run_in_frame(cast("RunLike", run), frame, joint, point, fixed_in, model)
 
 
+@each_member
 def _run_in_frame(
     run: RunLike,
     frame: str | Frame,

@@ -9,6 +9,7 @@ import numpy as np
 from linkwise.base import HALVES, Array, lengths
 from linkwise.loads.engineering import QUANTITIES, derived_rows, has_power, joint_directions
 from linkwise.loads.extremes import Extremes, extremes_of, load_at_extremes, quantity_rows
+from linkwise.loads.members import each_member
 from linkwise.loads.samples import (
     blocks,
     joint_names,
@@ -100,6 +101,7 @@ def _with_neighbours(where: slice, count: int) -> slice:
     return slice(max(0, where.start - 1), min(count, where.stop + 1))
 
 
+@each_member
 def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
     """Per quantity and joint the peak, when, and the whole wrench at that moment.
 
@@ -190,6 +192,7 @@ def _how(between: Extremes | None) -> dict[str, str]:
     return {"extremes": "of the samples" if between is None else "along the steps"}
 
 
+@each_member
 def envelope(run: RunLike) -> xr.Dataset:
     """Smallest and largest value of every load component and when: (joint, component).
 
@@ -225,6 +228,7 @@ def envelope(run: RunLike) -> xr.Dataset:
     return xr.Dataset(data, coords=coords, attrs=_how(between))
 
 
+@each_member
 def peak_loads(run: RunLike) -> xr.Dataset:
     """Largest force and moment that each joint carries, and when.
 

@@ -71,7 +71,7 @@ def margins(
     """How far the peaks stay below the ratings.
 
     Args:
-        summary: Of `linkwise.loads.summary`.
+        summary: Of `linkwise.loads.summary`, of a batch or a sweep too.
         ratings: By joint name.
         plus_minus: Error bounds (quantity, joint) of the peaks. They count against the margin, and
             so does what peaks may have missed (`sampling` of the summary).
@@ -85,19 +85,21 @@ def margins(
     joints = [str(name) for name in summary["joint"].values]
     names = [str(name) for name in summary["quantity"].values]
     table = rating_table(ratings, joints, names)
-    for k, j in np.argwhere(np.isfinite(table) & np.isnan(summary["peak"].values)):
+    peaks = summary["peak"].transpose(..., "quantity", "joint")
+    nowhere = np.isnan(peaks.values).reshape(-1, *table.shape).all(axis=0)
+    for k, j in np.argwhere(np.isfinite(table) & nowhere):
         raise InputError(
             f"rating for joint {joints[j]!r}: it has no single axis, so no "
             f"{QUANTITIES[names[k]].long_name}; rate force or moment"
         )
-    peak = np.abs(summary["peak"].values)
+    peak = np.abs(peaks.values)
     if plus_minus is not None:
         peak = peak + plus_minus.values + summary["sampling"].values
     with np.errstate(divide="ignore"):
         margin = table / peak - 1
-    dims = ("quantity", "joint")
+    dims = peaks.dims
     data = {
-        "rating": (dims, table, {"long_name": "rating", "units": "of the quantity"}),
+        "rating": (dims[-2:], table, {"long_name": "rating", "units": "of the quantity"}),
         "use": (dims, peak / table, {"long_name": "peak over rating", "units": "1"}),
         "margin": (dims, margin, {"long_name": "rating over peak, less 1", "units": "1"}),
     }

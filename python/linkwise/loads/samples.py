@@ -45,7 +45,7 @@ class RunLike(Protocol):
 def _require_run(run: object) -> None:
     if not (hasattr(run, "dataset") and hasattr(run, "load_model")):
         raise InputError(
-            f"run: is a {type(run).__name__}; give a linkwise.Run. One member of a batch is "
+            f"run: is a {type(run).__name__}; this takes a linkwise.Run. One member of a batch is "
             "linkwise.Run(batch.isel(member=0), model=model)"
         )
 

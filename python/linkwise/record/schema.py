@@ -53,6 +53,10 @@ class Schema:
         return self.extremes.variables if self.extremes else ()
 
     @property
+    def extremes_bytes(self) -> int:
+        return sum(variable.row_bytes for variable in self.timeless)
+
+    @property
     def row_bytes(self) -> int:
         return 8 + sum(variable.row_bytes for variable in self.variables)
 

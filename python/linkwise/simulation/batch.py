@@ -18,7 +18,13 @@ from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
 from linkwise.simulation.arguments import check_steps, number, optional_count, sample_times
-from linkwise.simulation.simulate import SimulationInterrupted, check_driven, set_driven
+from linkwise.simulation.recording import Recording
+from linkwise.simulation.simulate import (
+    SimulationInterrupted,
+    check_driven,
+    driven_attrs,
+    set_driven,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -126,7 +132,7 @@ def simulate_batch(
     times: npt.ArrayLike | None = None,
     integrator: str = "runge_kutta_4",
     record: Collection[str] | None = None,
-    extremes: bool = False,
+    extremes: bool | None = None,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Simulate many motions at once with fixed steps: members in SIMD lanes, lanes over threads.
@@ -148,7 +154,10 @@ def simulate_batch(
         record: Names of the quantities to record, of those that `linkwise.quantities()` marks
             `of_members`; all of them by default.
         extremes: Whether the extremes between samples are kept as well, where joint loads are
-            recorded: see `Recording`.
+            recorded; by default as in `Recording`. The search for them takes as long as the steps
+            or twice as long: 200 motions of 500 steps take 0.29 s instead of 0.15 s for an arm of
+            6 joints, 2.7 s instead of 0.87 s for a chain of 30. Without it peaks are those of the
+            samples; `record` without "joint_load" needs no search either.
         threads: Worker threads; the results do not depend on it.
 
     Returns:
@@ -165,7 +174,8 @@ def simulate_batch(
     models = _machines(model)
     first = models[0]
     sampled = sample_times(duration, every, times)
-    schema = build_schema(first, QUANTITIES if record is None else record, extremes=extremes)
+    keep = Recording(extremes=extremes).keeps_extremes(first.n_joints)
+    schema = build_schema(first, QUANTITIES if record is None else record, extremes=keep)
     unknown = [name for name in schema.quantities if name not in QUANTITIES]
     if unknown:
         raise InputError(f"record: a batch has no {shown(unknown[0])}; use {', '.join(QUANTITIES)}")
@@ -192,7 +202,7 @@ def simulate_batch(
     lead = lead if isinstance(model, Model) else (len(models), *lead)
     count = int(np.prod(lead, dtype=np.int64))
     _core.require_memory(
-        float(count) * sampled.size * schema.row_bytes,
+        float(count) * (sampled.size * schema.row_bytes + schema.extremes_bytes),
         f"{sampled.size} samples of {count} members",
     )
     ignored = warnings_of(*models)
@@ -211,7 +221,7 @@ def simulate_batch(
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
     early = sum(ending.outcome != "converged" for ending in endings)
     attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)
-    attrs |= warning_attrs([*notes, *ignored])
+    attrs |= driven_attrs(by_joint, by_name) | warning_attrs([*notes, *ignored])
     attrs |= {"outcome": "converged" if not early else f"{early} of {count} members ended early"}
     dataset = dataset.assign_attrs({name: plain(value) for name, value in attrs.items()})
     if interrupted:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from linkwise._core import InputError
+from linkwise.io.complaint import shown
+from linkwise.record.schema import resolve_quantities
 from linkwise.simulation.arguments import options_object
 
 # Extremes of larger machines are kept if asked for: they take as much memory as five samples.
@@ -31,13 +33,15 @@ class Recording:
     extremes: bool | None = None
     scenario_text: str = ""
 
+    def __post_init__(self) -> None:
+        if not (self.extremes is None or isinstance(self.extremes, bool)):
+            raise InputError(f"extremes: is {shown(self.extremes)}; use True, False or None")
+        if self.quantities is not None:
+            resolve_quantities(self.quantities)
+
     def keeps_extremes(self, joints: int) -> bool:
         """Whether a machine with so many joints keeps them."""
-        if self.extremes is None:
-            return joints <= MOST_JOINTS
-        if not isinstance(self.extremes, bool):
-            raise InputError(f"extremes: is {self.extremes!r}; use True, False or None")
-        return self.extremes
+        return joints <= MOST_JOINTS if self.extremes is None else self.extremes
 
     @classmethod
     def of(

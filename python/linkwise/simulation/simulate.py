@@ -138,13 +138,20 @@ def set_driven(
     return notes
 
 
+def driven_attrs(drives: Mapping[str, Drive], wrenches: Mapping[str, Wrench]) -> dict[str, str]:
+    """What drives the machine, as JSON text; functions of runs read it."""
+    return {
+        "drives": json.dumps({joint: describe(drive) for joint, drive in drives.items()}),
+        "wrenches": json.dumps({name: describe(wrench) for name, wrench in wrenches.items()}),
+    }
+
+
 def _chosen(
     simulation: Simulation, drives: Mapping[str, Drive], wrenches: Mapping[str, Wrench]
 ) -> dict[str, Any]:
     """Attributes that the prepared simulation adds to the provenance."""
     return {
-        "drives": json.dumps({joint: describe(drive) for joint, drive in drives.items()}),
-        "wrenches": json.dumps({name: describe(wrench) for name, wrench in wrenches.items()}),
+        **driven_attrs(drives, wrenches),
         "method": simulation.method,
         "solver": simulation.solver or "none",
         "reason": simulation.reason,

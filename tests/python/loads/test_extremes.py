@@ -245,8 +245,8 @@ def test_a_run_without_extremes_falls_back_to_its_samples():
 def test_members_have_what_each_has_alone():
     q0 = np.linspace(0, 0.3, 5)[:, None] * np.ones(3)
     options = {"drives": {"elbow": lw.PD(30, 2, 0.1)}, "duration": 0.5, "every": 0.5}
-    batch = lw.simulate_batch(arm(), step=1e-2, q0=q0, extremes=True, **options)
-    twice = lw.simulate_batch(arm(), step=1e-2, q0=q0, extremes=True, threads=2, **options)
+    batch = lw.simulate_batch(arm(), step=1e-2, q0=q0, **options)
+    twice = lw.simulate_batch(arm(), step=1e-2, q0=q0, threads=2, **options)
     for k in range(5):
         alone = lw.simulate(arm(), q0=q0[k], integrator="runge_kutta_4", step=1e-2, **options)
         for name in ("extreme_quantity", "extreme_joint_load", "extreme_velocity"):
@@ -255,7 +255,14 @@ def test_members_have_what_each_has_alone():
             np.testing.assert_array_equal(got, twice[name].isel(member=k))
         peaks = lw.loads.summary(lw.Run(batch.isel(member=k), model=arm())).peak
         np.testing.assert_allclose(peaks, lw.loads.summary(alone).peak, rtol=1e-9, atol=1e-9)
-    assert "extreme_quantity" not in lw.simulate_batch(arm(), step=1e-2, q0=q0, **options)
+    without = lw.simulate_batch(arm(), step=1e-2, q0=q0, extremes=False, **options)
+    assert "extreme_quantity" not in without
+    with pytest.raises(lw.InputError, match="extremes: is 'x'; use True, False or None"):
+        lw.simulate_batch(arm(), step=1e-2, q0=q0, extremes="x", **options)
+    with pytest.raises(lw.InputError, match="extremes: is 1; use True, False or None"):
+        lw.Recording(extremes=1)
+    with pytest.raises(lw.InputError, match="unknown quantity 'positon'"):
+        lw.Recording(quantities=["positon"])
 
 
 @pytest.mark.parametrize("integrator", ["adams", "bdf", "runge_kutta_4", "semi_implicit_euler"])
