@@ -41,7 +41,7 @@ DynamicsOptions options_of(const std::string& method, const std::string& solver,
 
 void check_room(const Model& m, const States& s, bool passive, bool with_loads) {
   const double scratch = 8.0 * s.count * m.nv() * (passive || !s.tau.given);
-  const double results = 8.0 * s.count * (m.nv() + (with_loads ? 6.0 * m.n_joints() : 0));
+  const double results = 8.0 * s.count * (m.nv() + (with_loads ? 6.0 * m.n_loads() : 0));
   if (scratch + results > worth_a_check)
     require_memory(scratch + results, "forward dynamics of " + std::to_string(s.count) + " states");
 }
@@ -57,7 +57,7 @@ nb::object forward_dynamics(const PyModel& self, const States& s, bool passive, 
   check_room(m, s, passive, with_loads);
   NewArray du(s.lead, {size(m.nv())});
   std::unique_ptr<NewArray> loads;
-  if (with_loads) loads = std::make_unique<NewArray>(s.lead, Shape{size(m.n_joints()), 6});
+  if (with_loads) loads = std::make_unique<NewArray>(s.lead, Shape{size(m.n_loads()), 6});
   std::vector<double> force;
   const ForwardOutput out{du.data, loads ? loads->data : nullptr, full ? &force : nullptr};
   EvaluationReport report = without_gil([&](const GoOn& go_on) {
@@ -126,6 +126,7 @@ nb::list method_list() {
     d["uses_solver"] = e.uses_solver;
     d["chains_only"] = e.chains_only;
     d["linear_time"] = e.linear_time;
+    d["takes_loops"] = e.takes_loops;
     out.append(d);
   }
   return out;
@@ -209,7 +210,7 @@ void bind_results(nb::module_& m) {
   nb::class_<ForwardResult>(m, "ForwardDynamicsResult", "What forward_dynamics(full=True) returns.")
       .def_ro("acceleration", &ForwardResult::acceleration, "dv/dt (..., nv) [rad/s2, m/s2].")
       .def_ro("joint_load", &ForwardResult::joint_load,
-              "(..., n_joints, 6) [N, N m], as of joint_loads.")
+              "(..., n_joints + n_loops, 6) [N, N m], as of joint_loads.")
       .def_ro("constraint_force", &ForwardResult::constraint_force,
               "f (..., unknowns) [N, N m] of A f = b [sharf1993]; None of a method without it.")
       .def_ro("report", &ForwardResult::report, "How it went: a Report.")
@@ -305,7 +306,7 @@ Raises:
          double gravity, nb::handle threads) {
         return inverse_dynamics(self, q, v, a, external, gravity, threads, true);
       },
-      "Joint loads", "    (..., n_joints, 6) [N, N m]: as of joint_loads.");
+      "Joint loads", "    (..., n_joints + n_loops, 6) [N, N m]: as of joint_loads.");
   m.def("joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
         nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
         "solver"_a = "auto", "threads"_a = nb::none(),
@@ -343,7 +344,7 @@ void bind_dynamics(nb::module_& m) {
       "The table of linear solvers: dictionaries of name, description, kind, parallel, reference.");
   m.def("methods", &method_list,
         "The table of dynamics methods: dictionaries of name, description, reference, uses_solver, "
-        "chains_only, linear_time.");
+        "chains_only, linear_time, takes_loops.");
   m.def("integrators", &integrator_list,
         "The table of integrators: dictionaries of name, description, fixed_step.");
 }

@@ -182,7 +182,10 @@ void bind_sizes(ModelClass& c) {
           "Degrees of freedom: length of v and tau.")
       .def_prop_ro(
           "n_joints", [](const PyModel& s) { return s.model->n_joints(); },
-          "Joints that carry a load; loads are (..., n_joints, 6).")
+          "Joints of the tree that carry a load; loads are (..., n_joints + n_loops, 6).")
+      .def_prop_ro(
+          "n_loops", [](const PyModel& s) { return s.model->n_loops(); },
+          "Joints that close loops; their loads stand behind those of the tree's joints.")
       .def_prop_ro(
           "n_bodies", [](const PyModel& s) { return s.model->n_bodies(); },
           "Bodies of the recursion: parts with mass. Fewer than n_joints where links between "
@@ -224,7 +227,15 @@ void bind_joints(ModelClass& c) {
        [](const PyModel& s) {
          return list_per_joint(s, [](const JointInfo& j) { return j.name; });
        },
-       "Joints that carry a load, in the order of all that is per joint.")
+       "Joints of the tree that carry a load, in the order of all that is per joint.")
+      .def_prop_ro(
+          "loop_names",
+          [](const PyModel& s) {
+            nb::list names;
+            for (const LoopJoint& loop : s.model->loops.joints) names.append(loop.joint.name);
+            return names;
+          },
+          "Joints that close loops (n_loops,), in the order of their loads.")
       .def_prop_ro(
           "joint_types",
           [](const PyModel& s) {

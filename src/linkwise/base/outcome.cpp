@@ -29,6 +29,10 @@ constexpr OutcomeEntry table[] = {
      "the integrator at auto"},
     {Outcome::too_many_steps, "too_many_steps", "the allowed number of steps is used up",
      "allow more by max_steps, loosen the tolerance, or leave the integrator at auto"},
+    {Outcome::singular_position, "singular_position",
+     "what closed loops demand of the accelerations contradicts itself",
+     "the machine is in a singular position, such as a linkage stretched straight, or its rates "
+     "open a loop: start a little beside it, with rates that keep the loops closed"},
     {Outcome::interrupted, "interrupted", "it was interrupted", "start it again"},
 };
 

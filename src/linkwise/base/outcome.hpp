@@ -16,6 +16,7 @@ enum class Outcome {
   diverged,
   step_too_small,
   too_many_steps,
+  singular_position,
   interrupted,
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linkwise/base/error.hpp"
+
 namespace linkwise {
 namespace {
 
@@ -38,12 +40,28 @@ Compliance<double> yielding(const Model& model, int body, const Transform<double
   return invert_inertia(M);
 }
 
+/// Neither rotors nor given motion: both would be rows of their own.
+void require_free_joints(const Model& model) {
+  const auto& armature = model.loops.dof[static_cast<int>(DofProperty::armature)];
+  for (const LoopJoint& loop : model.loops.joints)
+    for (const Element& e : stack_of(model, loop)) {
+      const bool rotor = std::any_of(armature.begin() + e.v, armature.begin() + e.v + e.nv,
+                                     [](double x) { return x > 0; });
+      if (rotor || e.prescribed)
+        throw InputError("joint '" + loop.joint.name + "'" + model.where() + " closes a loop and " +
+                         (rotor ? "has an armature" : "has a given motion") +
+                         "; give that to another joint of the loop");
+    }
+}
+
 Force<double> direction(const Vector6<double>& Q) { return to_force(Q.data()); }
 
 }  // namespace
 
 ArticulatedLoops::ArticulatedLoops(const Model& model)
     : model_(model), sweeps_(model), states_(model), groups_(make_loop_groups(model)) {
+  require_free_joints(model);
+  refuse_couplings(model, "method articulated_body");
   work_.resize(groups_.size());
   for (size_t g = 0; g < groups_.size(); ++g) {
     const size_t rows = groups_[g].rows;
@@ -114,7 +132,7 @@ void ArticulatedLoops::place_forces(int g) {
       };
       add(member.on_a, wrench_on_a(loop, Q));
       add(member.on_b, wrench_on_b(model_.loops.joints[member.loop], Q));
-      w.r[member.row + i] = dot(loop.c, Q);
+      w.r[member.row + i] = loop.r[i];
       w.size[member.row + i] = std::abs(w.r[member.row + i]);
     }
   }

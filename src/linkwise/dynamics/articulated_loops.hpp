@@ -12,20 +12,11 @@
 #include <vector>
 
 #include "linkwise/dynamics/loop_groups.hpp"
+#include "linkwise/dynamics/loop_report.hpp"
 #include "linkwise/linear/semidefinite.hpp"
 #include "linkwise/recursion/tree_sweeps.hpp"
 
 namespace linkwise {
-
-/// How the loops went.
-struct LoopReport {
-  int rows = 0, rank = 0;     ///< of all loop joints
-  double smallest_pivot = 1;  ///< of what counts as independent, over the largest
-  /// By how much dependent constraints contradict each other, over the accelerations that all ask
-  /// for: rounding errors, unless the position is singular or the state is not consistent.
-  double contradiction = 0;
-  bool is_contradictory() const { return contradiction > 1e-6; }
-};
 
 class ArticulatedLoops {
  public:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <optional>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/base/finite.hpp"
@@ -10,6 +11,7 @@
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/parts.hpp"
 #include "linkwise/forces/passive.hpp"
+#include "linkwise/kinematics/loop_states.hpp"
 #include "linkwise/solve/direct/direct_solver.hpp"
 
 namespace linkwise {
@@ -83,14 +85,38 @@ bool rows_finite(const double* results, size_t first, size_t rows, size_t width)
   return !results || all_finite({results + first * width, rows * width});
 }
 
+/// What joints that close loops add to a state's input. InputError where it leaves one open.
+class LoopInput {
+ public:
+  LoopInput(const Model& model, const BatchInput& s, size_t count)
+      : model_(model), states_(model), passive_(s.passive_acts), several_(count > 1) {}
+
+  void add(size_t i, SweepInput<double>& in) {
+    states_.update(in);
+    require_closed(model_, states_, several_ ? "state " + std::to_string(i) + ": " : "");
+    if (!passive_) return;
+    tau_.assign(model_.loops.nv, 0.0);
+    add_passive_forces(model_.loops, states_.q().data(), states_.v().data(), tau_.data());
+    in.loop_tau = tau_.data();
+  }
+
+ private:
+  const Model& model_;
+  LoopStates states_;
+  bool passive_, several_;
+  std::vector<double> tau_;
+};
+
 /// Every state by one method, one after the other.
 void one_by_one(const Model& m, DynamicsMethod& method, size_t count, const BatchInput& s,
                 const ForwardOutput& out, DynamicsReport& report, const GoOn& go_on) {
   const std::vector<double> zero(m.nv());
+  const size_t n_load = 6 * static_cast<size_t>(m.n_loads());
   const auto finite = [&](size_t i) {
-    return rows_finite(out.acceleration, i, 1, m.nv()) &&
-           rows_finite(out.joint_load, i, 1, 6 * m.n_joints());
+    return rows_finite(out.acceleration, i, 1, m.nv()) && rows_finite(out.joint_load, i, 1, n_load);
   };
+  std::optional<LoopInput> loops;
+  if (m.n_loops() > 0) loops.emplace(m, s, count);
   for (size_t i = 0; i < count && go_on(); ++i) {
     SweepInput<double> in;
     in.q = s.q + i * m.nq();
@@ -99,9 +125,11 @@ void one_by_one(const Model& m, DynamicsMethod& method, size_t count, const Batc
     in.external = s.external ? s.external + i * 6 * m.n_joints() : nullptr;
     in.prescribed = s.du ? s.du + i * m.nv() : zero.data();
     in.gravity_factor = s.gravity_factor;
+    if (loops) loops->add(i, in);
     const DynamicsReport r =
         method.evaluate(0, in, out.acceleration + i * m.nv(),
-                        out.joint_load ? out.joint_load + i * 6 * m.n_joints() : nullptr);
+                        out.joint_load ? out.joint_load + i * n_load : nullptr);
+    report.loops = r.loops;
     report.iterations = std::max(report.iterations, r.iterations);
     report.error_estimate = std::max(report.error_estimate, r.error_estimate);
     report.error_is_bound = r.error_is_bound && (i == 0 || report.error_is_bound);
@@ -243,7 +271,7 @@ Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const Dynami
   const bool is_auto = options.method == "auto";
   // This path builds no text: that would take as long as the dynamics of a small machine.
   if ((is_auto || options.method == "articulated_body") && options.solver == "auto") {
-    const bool alone = count == 1 && workspace.is_split();
+    const bool alone = model_->n_loops() > 0 || (count == 1 && workspace.is_split());
     const Choice& by_default = workspace.default_choice();
     choice.method = alone && is_auto ? by_default.method : "articulated_body";
     if (alone && is_auto) choice.solver = by_default.solver;

@@ -42,7 +42,7 @@ std::string failure_text(const Model& model, const EvaluationReport& report);
 /// Where forward dynamics goes. Loads and forces that are null are not computed.
 struct ForwardOutput {
   double* acceleration = nullptr;                   ///< [count][nv]
-  double* joint_load = nullptr;                     ///< [count][n_joints][6]
+  double* joint_load = nullptr;                     ///< [count][n_loads][6]
   std::vector<double>* constraint_force = nullptr;  ///< [count][unknowns]; empty without any
 };
 

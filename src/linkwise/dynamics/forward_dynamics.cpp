@@ -2,6 +2,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/articulated_body.hpp"
+#include "linkwise/dynamics/articulated_loops.hpp"
 #include "linkwise/dynamics/articulated_paths.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/constraint_elimination.hpp"
@@ -71,8 +72,29 @@ class FusedConstraintForce : public DynamicsMethod {
   std::vector<double> f_;
 };
 
+class ClosedLoops : public DynamicsMethod {
+ public:
+  explicit ClosedLoops(const Model& model) : kernel_(model) {}
+  DynamicsReport evaluate(double, const SweepInput<double>& in, double* du,
+                          double* loads) override {
+    DynamicsReport report;
+    if (!kernel_.evaluate(in, du, loads)) {
+      report.outcome = Outcome::not_positive_definite;
+      report.body = kernel_.failed_body();
+    } else if (kernel_.report().is_contradictory()) {
+      report.outcome = Outcome::singular_position;
+    }
+    report.loops = kernel_.report();
+    return report;
+  }
+
+ private:
+  ArticulatedLoops kernel_;
+};
+
 std::unique_ptr<DynamicsMethod> make_articulated_body(const Model& model,
                                                       const DynamicsOptions& options) {
+  if (model.n_loops() > 0) return std::make_unique<ClosedLoops>(model);
   if (paths_fill(model, native_lanes))
     return std::make_unique<Recursion<ArticulatedPaths<Lanes<native_lanes>>>>(model,
                                                                               options.executor);
@@ -88,25 +110,25 @@ std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model,
   return std::make_unique<ConstraintForce>(model, options);
 }
 
-// name, description, reference, uses a solver, chains only, any body, linear time
+// name, description, reference, uses a solver, chains only, any body, linear time, loops
 constexpr DynamicsEntry table[] = {
     {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false,
-     false, true, true, make_articulated_body},
+     false, true, true, true, make_articulated_body},
     {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993",
-     true, false, false, true, make_constraint_force},
+     true, false, false, true, false, make_constraint_force},
     {"piecewise",
      "one long revolute chain in pieces: recursion inside, constraint forces between, on lanes and "
      "threads",
-     "anderson2000", true, true, false, true, make_method<Piecewise>},
+     "anderson2000", true, true, false, true, false, make_method<Piecewise>},
     {"composite_rigid_body",
      "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)", "walker1982", false,
-     false, true, false, make_recursion<CompositeRigidBody>},
+     false, true, false, false, make_recursion<CompositeRigidBody>},
     {"joint_space_conjugate_gradient",
      "conjugate gradients on the joint-space mass matrix, one inverse dynamics per iteration",
-     "lee1988", false, false, true, false, make_method<JointSpaceConjugateGradient>},
+     "lee1988", false, false, true, false, false, make_method<JointSpaceConjugateGradient>},
     {"global_projection",
      "all bodies' motion equations projected on what the joints let through, O(N^3)", "hughes1985",
-     false, false, true, false, make_recursion<GlobalProjection>},
+     false, false, true, false, false, make_recursion<GlobalProjection>},
 };
 
 /// A method on a machine with armatures whose axes turn.
@@ -156,6 +178,10 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
     if (options.solver != "auto") {
       choice.method = "constraint_force";
       choice.reason = "a solver was asked for, and only constraint_force uses one";
+    } else if (model.n_loops() > 0) {
+      choice.method = "articulated_body";
+      choice.reason = "joint '" + model.loops.joints.front().joint.name +
+                      "' closes a loop, which only the recursion takes";
     } else if (model.n_bodies() >= piecewise_from && Piecewise::suits(model)) {
       choice.method = "piecewise";
       choice.reason = "a revolute chain of " + std::to_string(model.n_bodies()) +
@@ -172,7 +198,9 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
   }
   const DynamicsEntry& entry = find_dynamics(choice.method);
   require_known_bodies(model, entry);
-  refuse_loops(model, "method " + std::string(entry.name));
+  refuse_couplings(model, "method " + std::string(entry.name));
+  if (!entry.takes_loops)
+    refuse_loops(model, "method " + std::string(entry.name), "use method articulated_body");
   if (!entry.uses_solver)
     choice.solver = "";
   else if (choice.solver == "auto")
@@ -181,8 +209,8 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
 }
 
 bool is_split(const Model& model) {
-  return choose_dynamics(model, {}).method == "piecewise" || paths_fill(model, native_lanes) ||
-         Branches(model).any();
+  return model.n_loops() > 0 || choose_dynamics(model, {}).method == "piecewise" ||
+         paths_fill(model, native_lanes) || Branches(model).any();
 }
 
 std::unique_ptr<DynamicsMethod> make_dynamics(const Model& model, const DynamicsOptions& options) {

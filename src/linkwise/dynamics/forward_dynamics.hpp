@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "linkwise/dynamics/loop_report.hpp"
 #include "linkwise/kinematics/body_state.hpp"
 #include "linkwise/solve/initial_guess.hpp"
 #include "linkwise/solve/solver.hpp"
@@ -25,12 +26,13 @@ struct DynamicsOptions {
 /// What an evaluation reports: the solver's report, and where it failed.
 struct DynamicsReport : Report {
   int body = -1;  ///< at which it failed
+  LoopReport loops;
 };
 
 class DynamicsMethod {
  public:
   virtual ~DynamicsMethod() = default;
-  /// du [nv]; loads [n_joints][6] or null. t is only used to warm-start iterations.
+  /// du [nv]; loads [n_loads][6] or null. t is only used to warm-start iterations.
   virtual DynamicsReport evaluate(double t, const SweepInput<double>& in, double* du,
                                   double* loads) = 0;
   /// The state at t was accepted by the integrator: warm starts may build on its solution.
@@ -47,6 +49,7 @@ struct DynamicsEntry {
   bool chains_only;  ///< takes one kind of machine; the others take every tree
   bool any_body;     ///< takes bodies of every kind; the others take rigid ones
   bool linear_time;  ///< the work grows as the number of bodies; the others are for short chains
+  bool takes_loops;  ///< takes machines whose joints close loops; the others take trees
   std::unique_ptr<DynamicsMethod> (*make)(const Model&, const DynamicsOptions&);
 };
 

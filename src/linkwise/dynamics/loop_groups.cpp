@@ -68,6 +68,7 @@ void add_carriers(const Model& model, LoopGroup& group) {
 }  // namespace
 
 int loop_rows(const Model& model, const LoopJoint& loop) {
+  if (loop.rod_length > 0) return 1;
   int rows = 6;
   for (const Element& e : stack_of(model, loop))
     if (!e.prescribed) rows -= e.nv;

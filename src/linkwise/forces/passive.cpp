@@ -6,24 +6,29 @@
 #include "linkwise/forces/coordinate_forces.hpp"
 
 namespace linkwise {
+namespace {
 
-void add_passive_forces(const Model& model, const double* q, const double* v, double* tau) {
-  if (!model.has_passive_forces()) return;
-  const auto& damping = model.dof_values(DofProperty::damping);
-  const auto& friction = model.dof_values(DofProperty::friction);
-  const auto& friction_velocity = model.dof_values(DofProperty::friction_velocity);
-  const auto& stiffness = model.dof_values(DofProperty::stiffness);
-  const auto& rest = model.dof_values(DofProperty::rest_position);
-  const auto& lower = model.dof_values(DofProperty::lower);
-  const auto& upper = model.dof_values(DofProperty::upper);
-  const auto& stop = model.dof_values(DofProperty::limit_stiffness);
-  const auto& stop_damping = model.dof_values(DofProperty::limit_damping);
+/// Of the joints of a tree, or of those that close loops.
+template <class Joints>
+void add_forces(const Joints& joints, const double* q, const double* v, double* tau) {
+  const auto values = [&](DofProperty p) -> const std::vector<double>& {
+    return joints.dof[static_cast<int>(p)];
+  };
+  const auto& damping = values(DofProperty::damping);
+  const auto& friction = values(DofProperty::friction);
+  const auto& friction_velocity = values(DofProperty::friction_velocity);
+  const auto& stiffness = values(DofProperty::stiffness);
+  const auto& rest = values(DofProperty::rest_position);
+  const auto& lower = values(DofProperty::lower);
+  const auto& upper = values(DofProperty::upper);
+  const auto& stop = values(DofProperty::limit_stiffness);
+  const auto& stop_damping = values(DofProperty::limit_damping);
   const auto resistance = [&](int i, double rate) {
     double force = -damping[i] * rate;
     if (friction[i] > 0) force -= friction[i] * std::tanh(rate / friction_velocity[i]);
     return force;
   };
-  for (const Element& e : model.elements) {
+  for (const Element& e : joints.elements) {
     const int turning = info_of(e.kind).turning;
     if (turning > 0) {
       const Mat3<double> R = element_rotation(e, q);
@@ -37,7 +42,7 @@ void add_passive_forces(const Model& model, const double* q, const double* v, do
     }
     for (int i = e.v + turning; i < e.v + e.nv; ++i) tau[i] += resistance(i, v[i]);
   }
-  for (const Element& e : model.elements) {
+  for (const Element& e : joints.elements) {
     if (!has_scalar_coordinates(e)) continue;
     double rate[3], force[3];
     scalar_rates(e, q, v, rate);
@@ -53,6 +58,16 @@ void add_passive_forces(const Model& model, const double* q, const double* v, do
     }
     add_coordinate_forces(e, q, force, tau);
   }
+}
+
+}  // namespace
+
+void add_passive_forces(const Model& model, const double* q, const double* v, double* tau) {
+  if (model.has_passive_forces()) add_forces(model, q, v, tau);
+}
+
+void add_passive_forces(const LoopJoints& loops, const double* q, const double* v, double* tau) {
+  add_forces(loops, q, v, tau);
 }
 
 double passive_potential(const Model& model, const double* q) {

@@ -11,6 +11,9 @@ namespace linkwise {
 /// limit_damping s) back inward [hunt1975].
 void add_passive_forces(const Model& model, const double* q, const double* v, double* tau);
 
+/// The same of joints that close loops: q, v and tau are theirs alone.
+void add_passive_forces(const LoopJoints& loops, const double* q, const double* v, double* tau);
+
 /// Energy stored in springs and stops, J.
 double passive_potential(const Model& model, const double* q);
 

@@ -1,6 +1,11 @@
 #include "linkwise/kinematics/loop_states.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+
+#include "linkwise/base/error.hpp"
 
 namespace linkwise {
 namespace {
@@ -22,6 +27,24 @@ Transform<double> along(const std::vector<int>& path, const Transform<double>& X
   Transform<double> X = X_end;
   for (size_t i = path.size(); i-- > 0;) X = X * bodies[path[i]].X;
   return X;
+}
+
+double size(const Vec3<double>& r) { return std::sqrt(dot(r, r)); }
+
+double length_of(const Model& model, const LoopJoint& loop, const LoopPath& path) {
+  double length = size(loop.on_parent.r) + size(loop.on_child.r);
+  for (const auto* bodies : {&path.to_a, &path.to_b})
+    for (const int n : *bodies)
+      for (int i = 0; i < model.topology[n].n_elements; ++i)
+        length += size(model.elements[model.topology[n].first_element + i].placement.r);
+  return length > 0 ? length : 1;
+}
+
+/// To three digits.
+std::string rounded(double x) {
+  std::ostringstream text;
+  text << std::setprecision(3) << x;
+  return text.str();
 }
 
 }  // namespace
@@ -49,7 +72,11 @@ LoopStates::LoopStates(const Model& model)
       start_(model.loops.nq),
       q_(model.loops.nq),
       v_(model.loops.nv) {
-  for (const LoopJoint& loop : model.loops.joints) paths_.push_back(loop_path(model, loop));
+  for (int l = 0; l < model.n_loops(); ++l) {
+    const LoopJoint& loop = model.loops.joints[l];
+    paths_.push_back(loop_path(model, loop));
+    loops_[l].length = length_of(model, loop, paths_[l]);
+  }
   for (const Element& e : model.loops.elements)
     if (const int own = info_of(e.kind).quaternion; own >= 0) start_[e.q + own + 3] = 1;
 }
@@ -67,6 +94,20 @@ void LoopStates::update_loop(bool moving, int l) {
   const Transform<double> X_F = along(paths_[l].to_b, loop.on_child, bodies_);
   const Transform<double> X_FE{X_F.R * transpose(X_E.R), X_E.R * (X_F.r - X_E.r)};
   out.X_FA = X_FE * loop.on_parent;
+  const Motion<double> of_a = out.X_FA * velocity_of(loop.parent_body),
+                       of_b = loop.on_child * velocity_of(loop.joint.body);
+  out.speed = std::max(size(of_a.lin) + out.length * size(of_a.ang),
+                       size(of_b.lin) + out.length * size(of_b.ang));
+  if (loop.rod_length > 0)
+    update_rod(l, X_FE, of_b);
+  else
+    update_joint(moving, l, X_FE, of_a, of_b);
+}
+
+void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
+                              const Motion<double>& of_a, const Motion<double>& of_b) {
+  const LoopJoint& loop = model_.loops.joints[l];
+  LoopState& out = loops_[l];
   const std::span<const Element> stack = stack_of(model_, loop);
   closure_coordinates(stack, X_FE, q_.data());
 
@@ -78,19 +119,63 @@ void LoopStates::update_loop(bool moving, int l) {
   calc_general_state(stack, at, Motion<double>{}, state, columns);
   calc_closure_basis(columns.P, columns.n, out.basis);
   std::copy_n(columns.dof, columns.n, out.dof);
+  out.rows = out.basis.rows();
   closure_residual(out.basis, closure_gap(state.X, X_FE), out.gap);
 
-  const Motion<double> v_a = velocity_of(loop.parent_body);
-  const Vector6<double> of_b = to_array(loop.on_child * velocity_of(loop.joint.body)),
-                        of_a = to_array(out.X_FA * v_a);
+  const Vector6<double> a = to_array(of_a), b = to_array(of_b);
   Vector6<double> relative;
-  for (int i = 0; i < 6; ++i) relative[i] = of_b[i] - of_a[i];
+  for (int i = 0; i < 6; ++i) relative[i] = b[i] - a[i];
   for (int i = 0; i < columns.n; ++i)
     v_[columns.dof[i]] = linkwise::along(out.basis.dual[i], relative);
-  for (int i = 0; i < out.rows(); ++i) out.slip[i] = linkwise::along(out.basis.Q[i], relative);
   at.v = moving ? v_.data() : nullptr;
-  calc_general_state(stack, at, loop.on_parent * v_a, state, columns);
-  out.c = state.c;
+  calc_general_state(stack, at, loop.on_parent * velocity_of(loop.parent_body), state, columns);
+  const Vector6<double> c = to_array(state.c);
+  for (int i = 0; i < out.rows; ++i) {
+    out.slip[i] = linkwise::along(out.basis.Q[i], relative);
+    out.r[i] = linkwise::along(out.basis.Q[i], c);
+  }
+}
+
+/// Of two points at a constant distance: the acceleration along n is -|v across n|^2 / distance.
+/// That of a point is the componentwise one and w x v.
+void LoopStates::update_rod(int l, const Transform<double>& X_FE, const Motion<double>& of_b) {
+  const LoopJoint& loop = model_.loops.joints[l];
+  LoopState& out = loops_[l];
+  const double distance = size(X_FE.r);
+  const Vec3<double> n = (1 / distance) * (X_FE.R * X_FE.r);
+  const Motion<double> of_E = loop.on_parent * velocity_of(loop.parent_body);
+  const Vec3<double> relative = of_b.lin - X_FE.R * of_E.lin;
+  const Vec3<double> across = relative - dot(n, relative) * n;
+  const Vec3<double> turned = cross(of_b.ang, of_b.lin) - X_FE.R * cross(of_E.ang, of_E.lin);
+  out.basis.n = 0;
+  out.rows = 1;
+  out.basis.Q[0] = {n.x, n.y, n.z, 0, 0, 0};
+  out.gap[0] = distance - loop.rod_length;
+  out.slip[0] = dot(n, relative);
+  out.r[0] = -dot(across, across) / distance - dot(n, turned);
+}
+
+LoopMiss miss_of(const LoopState& state, const double* residuals) {
+  Vector6<double> held{};
+  for (int i = 0; i < state.rows; ++i)
+    for (int k = 0; k < 6; ++k) held[k] += residuals[i] * state.basis.Q[i][k];
+  return {size({held[0], held[1], held[2]}), size({held[3], held[4], held[5]})};
+}
+
+void require_closed(const Model& model, const LoopStates& states, const std::string& where) {
+  constexpr double allowed = 1e-6;
+  for (int l = 0; l < model.n_loops(); ++l) {
+    const LoopState& loop = states[l];
+    const std::string joint = "joint '" + model.loops.joints[l].joint.name + "'" + model.where();
+    const LoopMiss gap = miss_of(loop, loop.gap), slip = miss_of(loop, loop.slip);
+    if (!(gap.shift + gap.turn * loop.length <= allowed * loop.length))
+      throw InputError(where + joint + " is open: what it joins is " + rounded(1e3 * gap.shift) +
+                       " mm and " + rounded(gap.turn) + " rad apart; give q that closes its loop");
+    if (!(slip.shift + slip.turn * loop.length <= allowed * (loop.speed + loop.length)))
+      throw InputError(where + joint + " opens: what it joins parts by " + rounded(slip.shift) +
+                       " m/s and " + rounded(slip.turn) +
+                       " rad/s; give v that keeps its loop closed");
+  }
 }
 
 }  // namespace linkwise

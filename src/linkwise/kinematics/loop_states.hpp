@@ -5,8 +5,10 @@
 //     0 = G_a v_a + G_b v_b,      G_b = Q^T X_F,     G_a = -Q^T X_FA
 //     r = G_a a_a + G_b a_b,      r = Q^T c
 // with P, Q and c of the same stack of elements that a tree joint would have (joints/closure.hpp).
-// What is left of the pose is the gap, which is closed in a state that is consistent.
+// What is left of the pose is the gap, which is closed in a state that is consistent. A rod has no
+// P, and Q is the one direction n from E to F.
 #include <span>
+#include <string>
 #include <vector>
 
 #include "linkwise/joints/closure.hpp"
@@ -31,11 +33,12 @@ struct LoopState {
   Transform<double> X_FA;  ///< body a's frame, or the ground's -> F
   ClosureBasis basis;      ///< P^+T and Q
   int dof[6];              ///< of the columns of P, as loop joints count them
-  Motion<double> c;        ///< r = Q^T c
-  double gap[6];           ///< position residual g [rows]
-  double slip[6];          ///< Q^T v_rel [rows]: the rate of g where the gap is closed
-
-  int rows() const { return basis.rows(); }
+  int rows;
+  double r[6];     ///< Q^T c [rows]
+  double gap[6];   ///< position residual g [rows]
+  double slip[6];  ///< Q^T v_rel [rows]: the rate of g where the gap is closed
+  double speed;    ///< of the faster one of E and F at F, m/s; turns count by the length
+  double length;   ///< m: how far the loop reaches, by which turns are compared
 };
 
 class LoopStates {
@@ -54,6 +57,10 @@ class LoopStates {
 
  private:
   void update_loop(bool moving, int l);
+  /// The same of a joint and of a rod. of_a, of_b: velocities of both bodies at F.
+  void update_joint(bool moving, int l, const Transform<double>& X_FE, const Motion<double>& of_a,
+                    const Motion<double>& of_b);
+  void update_rod(int l, const Transform<double>& X_FE, const Motion<double>& of_b);
   Motion<double> velocity_of(int body) const {
     return body >= 0 ? bodies_[body].v : Motion<double>{};
   }
@@ -66,6 +73,16 @@ class LoopStates {
   std::vector<LoopState> loops_;
   std::vector<double> start_, q_, v_;
 };
+
+/// What a loop's residuals are as a shift, m or m/s, and a turn, rad or rad/s.
+struct LoopMiss {
+  double shift, turn;
+};
+LoopMiss miss_of(const LoopState& state, const double* residuals);
+
+/// InputError naming the first loop that a state leaves open, or opens, by more than a millionth of
+/// its length. `where`: begins the message.
+void require_closed(const Model& model, const LoopStates& states, const std::string& where = "");
 
 /// What wrench w of the joint on its child is on body b, and on body a, in the bodies' own frames.
 inline Force<double> wrench_on_b(const LoopJoint& loop, const Force<double>& w) {

@@ -135,6 +135,8 @@ class Model {
   int n_joints() const { return static_cast<int>(joints.size()); }
   int n_loops() const { return static_cast<int>(loops.joints.size()); }
   int n_couplings() const { return static_cast<int>(couplings.size()); }
+  /// Rows of joint loads: the joints of the tree, then those that close loops.
+  int n_loads() const { return n_joints() + n_loops(); }
   double total_mass() const { return total_mass_; }
   /// Index of a joint or throws InputError with the nearest names.
   int joint_index(const std::string& name) const;
@@ -191,8 +193,11 @@ class Model {
   NameIndex joint_by_name_, link_by_name_;
 };
 
-/// Throws InputError where the model has loops or couplings: `who` takes none.
-void refuse_loops(const Model& model, const std::string& who);
+/// Throws InputError where the model has couplings: `who` takes none.
+void refuse_couplings(const Model& model, const std::string& who);
+/// Where it has loops or couplings.
+void refuse_loops(const Model& model, const std::string& who,
+                  const std::string& remedy = "remove a joint of the loop");
 
 /// The bodies of a range, whose kind is known while compiling.
 template <class B>

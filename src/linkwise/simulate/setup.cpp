@@ -61,6 +61,7 @@ bool Setup::calls_functions() const {
 
 void Setup::settle() {
   if (settled_) return;
+  refuse_loops(*model, "a simulation");
   any_motion_ = false;
   for (const Drive& drive : drives) any_motion_ |= drive.kind == DriveKind::motion;
   if (any_motion_ && options.state)

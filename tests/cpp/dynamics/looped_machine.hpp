@@ -118,7 +118,7 @@ struct LoopedMachine {
       columns.push_back({});
       for (int l = 0; l < model.n_loops(); ++l)
         columns.back().insert(columns.back().end(), states[l].slip,
-                              states[l].slip + states[l].rows());
+                              states[l].slip + states[l].rows);
       unit[k] = 0;
     }
     n_rows = columns.empty() ? 0 : static_cast<int>(columns[0].size());

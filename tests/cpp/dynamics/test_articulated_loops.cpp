@@ -90,7 +90,7 @@ double violation(const LoopedMachine& machine, const LoopStates& states, int l,
   const auto a1 = motion_at(h), b1 = motion_at(-h), a2 = motion_at(2 * h), b2 = motion_at(-2 * h),
              a3 = motion_at(3 * h), b3 = motion_at(-3 * h);
   double worst = 0;
-  for (int i = 0; i < states[l].rows(); ++i) {
+  for (int i = 0; i < states[l].rows; ++i) {
     double sum = 0;
     for (int k = 0; k < 6; ++k) {
       const double turned =

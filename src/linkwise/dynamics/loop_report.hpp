@@ -1,0 +1,15 @@
+#pragma once
+
+namespace linkwise {
+
+/// What an evaluation saw of the loops.
+struct LoopReport {
+  int rows = 0, rank = 0;     ///< directions that loop joints hold, and how many are independent
+  double smallest_pivot = 1;  ///< of what counts as independent, over the largest
+  /// By how much dependent constraints contradict each other, over what all ask for: rounding
+  /// errors, unless the position is singular or the state is not consistent.
+  double contradiction = 0;
+  bool is_contradictory() const { return !(contradiction < 1e-6); }
+};
+
+}  // namespace linkwise
