@@ -324,8 +324,8 @@ Args:
     threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
 
 Returns:
-    (..., n_joints, 6) [N, N m]: the wrench that the inboard body exerts on the outboard body
-    through the joint, drive and passive forces included, at the joint point, in the joint frame
+    (..., n_joints + n_loops, 6) [N, N m]: the wrench that the inboard body exerts on the outboard
+    body through the joint, drive and passive forces included, at the joint point, in the joint frame
     of the outboard body, force first.
 
 Raises:

@@ -91,6 +91,18 @@ struct LoopedMachine {
     loop.on_child = stack_pose(stack, q_loops.data()) * loop.on_parent * at(a) * inverse(at(b));
     loops.joints.push_back(loop);
   }
+  /// A rod between random points of bodies a and b.
+  void close_rod(int a, int b, Draws& draws) {
+    close(JointType::fixed, a, b, draws);
+    LoopJoint& loop = model.loops.joints.back();
+    loop.on_child = {random_rotation(draws), random_vector3(draws)};
+    const auto poses = body_poses(tree, q.data());
+    const auto point = [&](int body, const Transform<double>& X) {
+      return body < 0 ? X.r : (X * poses[body]).r;
+    };
+    const Vec3<double> r = point(b, loop.on_child) - point(a, loop.on_parent);
+    loop.rod_length = std::sqrt(dot(r, r));
+  }
   /// The last loop joint once more: a copy of it holds what it holds already.
   void close_again() {
     LoopJoint loop = model.loops.joints.back();

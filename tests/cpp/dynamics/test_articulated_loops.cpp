@@ -39,23 +39,35 @@ FrameAt<Complex> frame_at(const Model& tree, const WorldTwin::Motions<Complex>& 
   return {};
 }
 
+/// Frames E and F of a loop.
+std::pair<FrameAt<Complex>, FrameAt<Complex>> frames_of(const LoopedMachine& machine,
+                                                        const LoopJoint& loop,
+                                                        const WorldTwin::Motions<Complex>& m) {
+  const auto at = [&](int body, const Transform<double>& X) {
+    if (body >= 0) return frame_at(machine.tree, m, body, X);
+    FrameAt<Complex> out;
+    for (int i = 0; i < 9; ++i) out.R.m[i] = transpose(X.R).m[i];
+    out.p = Vec3<Complex>{X.r.x, X.r.y, X.r.z};
+    return out;
+  };
+  return {at(loop.parent_body, loop.on_parent), at(loop.joint.body, loop.on_child)};
+}
+
 /// v_rel of F against E, in F's axes.
 std::vector<Complex> relative_motion(const LoopedMachine& machine, const LoopJoint& loop,
                                      const WorldTwin::Motions<Complex>& m) {
-  const auto F = [&] {
-    if (loop.joint.body >= 0) return frame_at(machine.tree, m, loop.joint.body, loop.on_child);
-    FrameAt<Complex> out;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) out.R.m[3 * i + j] = loop.on_child.R.m[3 * j + i];
-    out.p = Vec3<Complex>{loop.on_child.r.x, loop.on_child.r.y, loop.on_child.r.z};
-    return out;
-  }();
-  FrameAt<Complex> E;
-  if (loop.parent_body >= 0) E = frame_at(machine.tree, m, loop.parent_body, loop.on_parent);
-  const Vec3<Complex> lin = transpose_times(
-      F.R, F.v - (loop.parent_body >= 0 ? E.v + cross(E.w, F.p - E.p) : Vec3<Complex>{}));
+  const auto [E, F] = frames_of(machine, loop, m);
+  const Vec3<Complex> lin = transpose_times(F.R, F.v - (E.v + cross(E.w, F.p - E.p)));
   const Vec3<Complex> ang = transpose_times(F.R, F.w - E.w);
   return {lin.x, lin.y, lin.z, ang.x, ang.y, ang.z};
+}
+
+/// How fast the ends of a rod part.
+Complex parting(const LoopedMachine& machine, const LoopJoint& loop,
+                const WorldTwin::Motions<Complex>& m) {
+  const auto [E, F] = frames_of(machine, loop, m);
+  const Vec3<Complex> r = F.p - E.p;
+  return dot(r, F.v - E.v) / std::sqrt(dot(r, r));
 }
 
 /// P(q) u of a stack, in F's axes.
@@ -75,8 +87,10 @@ Vector6<double> joint_motion(std::span<const Element> stack, const double* q, co
 double violation(const LoopedMachine& machine, const LoopStates& states, int l,
                  const std::vector<double>& du) {
   const LoopJoint& loop = machine.model.loops.joints[l];
-  const WorldTwin twin(machine.tree);
-  const auto moving = relative_motion(machine, loop, twin.moved(machine.q, machine.v, du));
+  const auto motions = WorldTwin(machine.tree).moved(machine.q, machine.v, du);
+  if (loop.rod_length > 0)
+    return std::abs(parting(machine, loop, motions).imag() / WorldTwin::step);
+  const auto moving = relative_motion(machine, loop, motions);
   const std::span<const Element> stack = stack_of(machine.model, loop);
   std::vector<double> rate(states.q().size());
   for (const Element& e : stack)
@@ -191,6 +205,21 @@ TEST(ArticulatedLoops, EveryJointTypeClosesALoop) {
       EXPECT_EQ(rank, 6 - machine.model.loops.joints[0].joint.nv);
       expect_motion(machine, 5, rank);
     }
+  }
+}
+
+TEST(ArticulatedLoops, RodsKeepTwoPointsApart) {
+  for (const int a : {-1, 7}) {
+    Draws draws(50 + a);
+    LoopedMachine machine(
+        tree_spec(
+            {JointType::revolute, JointType::universal, JointType::spherical, JointType::prismatic,
+             JointType::spherical, JointType::revolute, JointType::universal, JointType::spherical},
+            {-1, 0, 1, 2, 1, 4, 5, 6}, draws),
+        draws);
+    for (const int b : {3, 2, 4}) machine.close_rod(a, b, draws);
+    EXPECT_EQ(machine.make_consistent(), 3);
+    expect_motion(machine, 5, 3);
   }
 }
 
