@@ -269,7 +269,7 @@ def runs() -> Iterator[tuple[str, Callable[[], lw.Run]]]:
         names[4]: 5.0,
     }
     wrenches = {srms().child_link_names[-1]: lw.Wrench(weight)}
-    turning = lw.Wrench(lambda t: np.cos(t) * np.array(weight), frame="body")
+    turning = lw.Wrench(lambda t: np.cos(t) * np.array(weight), axes="frame")
     along = {srms().child_link_names[2]: turning}
     arm = loaded_arm.arm
     for integrator in ("adams", "bdf"):

@@ -65,7 +65,7 @@ def test_spring_locked_free():
 
 
 def test_wrench():
-    name, (body, value), options = call_of(Wrench([1, 2, 3, 4, 5, 6], frame="body"), "hand")
+    name, (body, value), options = call_of(Wrench([1, 2, 3, 4, 5, 6], axes="frame"), "hand")
     assert (name, body, options) == ("wrench", "hand", {"frame": "body"})
     np.testing.assert_array_equal(value, [1, 2, 3, 4, 5, 6])
     table = Table([0, 1], np.ones((2, 6)))
@@ -129,8 +129,8 @@ def test_table_from_csv(tmp_path):
             "wrench: shape (1,); give six components fx fy fz nx ny nz",
         ),
         (
-            lambda: Wrench([0] * 6, frame="hand"),
-            "wrench frame: 'hand' is unknown; use world or body",
+            lambda: Wrench([0] * 6, axes="hand"),
+            "wrench axes: 'hand' is unknown; use world or frame",
         ),
         (lambda: Table([0], [1]), "table times: shape (1,); give (n,) with n >= 2"),
         (

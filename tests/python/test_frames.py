@@ -132,10 +132,10 @@ def test_leading_axes_broadcast(leg):
     "wrenches",
     [
         {"foot_tip": UP},
-        {TIP: UP},
+        {TIP: lw.Wrench(UP, "world")},
         {lw.Frame("thigh"): [0] * 6, lw.Frame("foot_tip"): UP},
         {"push": lw.Wrench(UP, at="foot_tip")},
-        {"one": lw.Wrench(UP / 4, at=TIP), "foot_tip": lambda t: 3 * UP / 4},
+        {"one": lw.Wrench(UP / 4, "world", at=TIP), "foot_tip": lambda t: 3 * UP / 4},
     ],
 )
 def test_holding_torques_under_a_force_at_the_tip(leg, wrenches):
@@ -148,7 +148,7 @@ def test_along_the_frames_own_axes(leg):
     axes = lw.frame_pose(leg, POSE, TIP)[:3, :3]
     turned = np.concatenate([axes.T @ UP[:3], axes.T @ UP[3:]])
     for at in (TIP, "foot_tip"):
-        run = hold(leg, {at: lw.Wrench(turned, frame="body")})
+        run = hold(leg, {at: lw.Wrench(turned, axes="frame")})
         np.testing.assert_allclose(run.drive_torque.values, [HELD] * 3, rtol=1e-8)
 
 
@@ -169,7 +169,7 @@ def test_loads_and_causes_are_computed_again_from_the_recorded_wrench(leg, tmp_p
 
 def test_a_batch_takes_frames(leg):
     options = {"step": 1e-4, "duration": 0.05, "every": 0.05, "q0": POSE}
-    batch = lw.simulate_batch(leg, wrenches={TIP: UP}, **options)
+    batch = lw.simulate_batch(leg, wrenches={TIP: lw.Wrench(UP, "world")}, **options)
     one = lw.simulate(
         leg, wrenches={"foot_tip": UP}, duration=0.05, every=0.05, q0=POSE, tolerance=1e-9
     )
@@ -244,7 +244,7 @@ def test_loads_of_a_state_under_a_wrench_at_the_tip(leg):
     still = np.zeros(2)
     for push in (
         {"foot_tip": UP},
-        {TIP: UP / 2, "half": lw.Wrench(UP / 2, at="foot_tip")},
+        {TIP: lw.Wrench(UP / 2, "world"), "half": lw.Wrench(UP / 2, at="foot_tip")},
         {"foot_tip": np.tile(UP, (5, 1))},
     ):
         outside = lw.external_wrenches(leg, many, push)
@@ -253,8 +253,8 @@ def test_loads_of_a_state_under_a_wrench_at_the_tip(leg):
         J = lw.frame_jacobian(leg, many, "foot_tip")
         free = lw.inverse_dynamics(leg, many, still, still)
         np.testing.assert_allclose(torque, free - np.swapaxes(J, -1, -2) @ UP, atol=1e-12)
-    run = hold(leg, {TIP: lw.Wrench(UP, "body")})
-    outside = lw.external_wrenches(leg, POSE, {TIP: lw.Wrench(UP, "body")})
+    run = hold(leg, {TIP: lw.Wrench(UP, "frame")})
+    outside = lw.external_wrenches(leg, POSE, {TIP: lw.Wrench(UP, "frame")})
     np.testing.assert_allclose(outside[1], run.external_wrench[0, 0], rtol=0, atol=1e-12)
     loads = lw.inverse_dynamics_loads(leg, POSE, still, still, external=outside)
     np.testing.assert_allclose(loads, run.joint_load[0], rtol=0, atol=1e-9)
@@ -297,3 +297,29 @@ def test_what_describes_a_frame_is_read_only(leg):
     for array in (TIP.origin, TIP.axes, *leg.frame_placement(TIP)[1:]):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1
+
+
+def test_at_a_frame_with_axes_it_must_be_said_whose_the_components_are(leg):
+    for use in (
+        lambda: hold(leg, {TIP: UP}),
+        lambda: hold(leg, {"push": lw.Wrench(UP, at=TIP)}),
+        lambda: lw.external_wrenches(leg, POSE, {TIP: UP}),
+        lambda: lw.simulate_batch(leg, wrenches={TIP: UP}, step=0.01, duration=0.1),
+    ):
+        with pytest.raises(lw.InputError, match="its frame on 'shank' has axes of its own; say"):
+            use()
+    hold(leg, {lw.Frame("shank", (0.01, 0, -0.25)): UP})
+
+
+def test_the_former_name_of_the_axes():
+    """frame="body" is axes="frame": both names had another meaning than lw.Frame."""
+    for former, axes in (("body", "frame"), ("world", "world")):
+        with pytest.warns(DeprecationWarning, match=f"frame= is now axes=; give axes='{axes}'"):
+            old = lw.Wrench(UP, frame=former)
+        assert old.axes == axes
+        with pytest.warns(DeprecationWarning, match=r"Wrench\.frame is now Wrench\.axes"):
+            assert old.frame == former
+    with pytest.warns(DeprecationWarning, match="give axes='frame'"):
+        assert lw.Wrench(UP, "body").axes == "frame"
+    with pytest.raises(lw.InputError, match="wrench axes: 'hand' is unknown; use world or frame"):
+        lw.Wrench(UP, axes="hand")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import os
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -30,7 +32,7 @@ from linkwise.io.table import read_table
 if TYPE_CHECKING:
     from linkwise._core import Model
 Interpolation = Literal["linear", "cubic"]
-WrenchAxes = Literal["world", "body"]
+WrenchAxes = Literal["world", "frame"]
 
 
 #: Beyond it, squares of times may overflow [s].
@@ -394,19 +396,29 @@ class Wrench:
     """An external force and moment at the origin of a frame on any link.
 
     value: [fx fy fz nx ny nz] in N and N m, or a Table of these six, or a function ``value(t)``.
-    frame: the axes of the components, "world", or "body" for those of the frame where it acts.
+    axes: those of the components, "world", or "frame" for those of the frame where it acts; "world"
+        by default, but at a Frame with axes of its own it must be said.
     at: where it acts, a link's name or a Frame; None: the frame that it is given for.
     breakpoints: Of a function, as for `Torque`.
     """
 
     value: npt.ArrayLike | Table | Callable[[float], npt.ArrayLike]
-    frame: WrenchAxes = field(default="world")
+    axes: WrenchAxes | None = field(default=None)
     at: str | Frame | None = field(default=None, kw_only=True)
     breakpoints: npt.ArrayLike | None = field(default=None, kw_only=True)
+    frame: InitVar[str | None] = field(default=None, kw_only=True)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, frame: str | None) -> None:
         object.__setattr__(self, "breakpoints", as_breakpoints(self.breakpoints, "wrench"))
-        check_one_of("wrench frame", self.frame, ("world", "body"))
+        given = self.axes if frame is None else frame
+        if frame is not None or given == "body":  # names that scripts before the release may use
+            check_one_of("wrench frame", given, ("world", "body"))
+            given = "frame" if given == "body" else "world"
+            text = f"Wrench: frame= is now axes=; give axes={given!r}"
+            warnings.warn(text, DeprecationWarning, stacklevel=3)
+            object.__setattr__(self, "axes", given)
+        elif given is not None:
+            check_one_of("wrench axes", given, ("world", "frame"))
         if self.at is not None and not isinstance(self.at, str | Frame):
             raise InputError(
                 f"wrench at: {shown(self.at)} is no frame; give the name of a link, or a "
@@ -433,8 +445,40 @@ class Wrench:
         def known(function: Callable[..., Any]) -> dict[str, Any]:
             return course(function, self.breakpoints, span)
 
-        at = frame if self.at is None else self.at
-        _hand_over(simulation, "wrench", at, self.value, known, frame=self.frame)
+        at = self.where(frame)
+        axes = "world" if self.along_world(at) else "body"
+        _hand_over(simulation, "wrench", at, self.value, known, frame=axes)
+
+    def where(self, frame: str | Frame) -> str | Frame:
+        """Where it acts, given for this frame."""
+        return frame if self.at is None else self.at
+
+    def placed(self, frame: str | Frame) -> Wrench:
+        """The same, acting where it says itself or at `frame`."""
+        at = self.where(frame)
+        made = copy.copy(self)
+        object.__setattr__(made, "at", Frame(at) if isinstance(at, str) else at)
+        made.along_world(at)
+        return made
+
+    def along_world(self, at: str | Frame) -> bool:
+        """Whether the components are along the world's axes, at this frame. InputError where that
+        must be said."""
+        if self.axes is None and isinstance(at, Frame) and not np.array_equal(at.axes, np.eye(3)):
+            raise InputError(
+                f"wrench: its frame on {at.link!r} has axes of its own; say whether the components "
+                'are along these: linkwise.Wrench(..., axes="frame"), or axes="world"'
+            )
+        return self.axes != "frame"
+
+
+def _former_frame(self: Wrench) -> str:
+    warnings.warn("Wrench.frame is now Wrench.axes", DeprecationWarning, stacklevel=2)
+    return "body" if self.axes == "frame" else "world"
+
+
+# A dataclass would take it for the argument's default.
+Wrench.frame = property(_former_frame)  # type: ignore[attr-defined]
 
 
 def as_drive(value: Any) -> Drive:

@@ -26,7 +26,8 @@ def external_wrenches(
         model: The machine.
         q: Positions (..., nq) [rad, m].
         wrenches: Per frame (a link's name, merged or not, or a `Frame`) force and moment (..., 6)
-            [N, N m] along the world's axes, or a constant `Wrench`. Leading axes broadcast.
+            [N, N m] along the world's axes, or a constant `Wrench`, which a `Frame` with axes of
+            its own needs. Leading axes broadcast.
 
     Returns:
         (..., n_joints, 6) [N, N m]: the sum on each body, at and in its joint frame.
@@ -54,12 +55,13 @@ def _on_body(
     model: Model, poses: Array, bodies: Mapping[str, int], frame: Any, wrench: Any
 ) -> tuple[int, Array, Array]:
     """The row of the body, and force and moment (..., 3) at and in its joint frame."""
-    along_world, at, value = True, frame, wrench
+    at, value = frame, wrench
     if isinstance(wrench, Wrench):
-        along_world = wrench.frame == "world"
-        at, value = frame if wrench.at is None else wrench.at, wrench.value
+        at, value = wrench.where(frame), wrench.value
         if callable(value) or hasattr(value, "times"):
             raise InputError(f"wrenches[{str(frame)!r}]: is no constant; give six numbers")
+    axes_of = wrench if isinstance(wrench, Wrench) else Wrench(np.zeros(6))
+    along_world = axes_of.along_world(at)
     name = f"wrenches[{str(frame)!r}]"
     given = as_floats(value, name)
     if given.shape[-1:] != (6,) or not np.isfinite(given).all():

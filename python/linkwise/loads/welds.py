@@ -159,7 +159,8 @@ def told_wrenches(run: RunLike) -> list[ToldWrench]:
         at = told.get("at", {"link": name})  # before frames a name was that of a link
         value = told.get("value")
         constant = value if isinstance(value, list) else None
-        found.append(ToldWrench(Frame(**at), told.get("frame") == "world", constant))
+        axes = told.get("axes", told.get("frame", "world"))  # before axes were called so
+        found.append(ToldWrench(Frame(**at), axes == "world", constant))
     return found
 
 

@@ -293,15 +293,16 @@ class ArgumentBuilder:
     def _wrench(self, name: str, section: WrenchSection) -> drives.Wrench:
         at = Frame(section.link or name, section.point, section.axes)
         frame = section.frame or ("world" if section.axes is None else "body")
+        axes: drives.WrenchAxes = "frame" if frame == "body" else "world"
         if section.table is None:
             zero = [Quantity(0.0, None)] * 3
             parts = [*(section.force or zero), *(section.moment or zero)]
-            return drives.Wrench([p.value for p in parts], frame, at=at)
+            return drives.Wrench([p.value for p in parts], axes, at=at)
         names = section.columns or COMPONENTS
         units = ["m", "m", "m", "rad", "rad", "rad"]
         keys = ("wrench", name)
         table = self._table(section.table, names, units, section.interpolation, keys, "torque")
-        return drives.Wrench(table, frame, at=at)
+        return drives.Wrench(table, axes, at=at)
 
     # -- tables -----------------------------------------------------------------------------
 

@@ -7,7 +7,6 @@ import json
 import os
 import time as clock
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -86,16 +85,15 @@ def check_driven(
             by_name[name] = _placed(as_wrench(wrench), frame)
             wrenched_bodies(model, {name: by_name[name]})
         except InputError as error:
-            raise InputError(f"wrenches[{name!r}]: {error}") from None
+            raise InputError(f"wrenches[{shown(name)}]: {error}") from None
     return by_joint, by_name
 
 
 def _placed(wrench: Wrench, frame: Any) -> Wrench:
     """The wrench with the frame where it acts: its own, or the one that it was given for."""
-    at = frame if wrench.at is None else wrench.at
     if wrench.at is not None and not isinstance(frame, str):
         raise InputError("is given for a frame and has another one; leave one of them out")
-    return replace(wrench, at=Frame(at) if isinstance(at, str) else at)
+    return wrench.placed(frame)
 
 
 def wrenched_bodies(model: Model, wrenches: Mapping[str, Wrench]) -> set[str]:

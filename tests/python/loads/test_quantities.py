@@ -148,7 +148,7 @@ def test_power_balance(swing):
         duration=1.0,
         every=0.0002,
         drives={"elbow": lambda t, q, v: [2 * np.sin(3 * t)]},
-        wrenches={"hand": lw.Wrench([2.0, 1.0, 0, 0, 0.3, 0], frame="body")},
+        wrenches={"hand": lw.Wrench([2.0, 1.0, 0, 0, 0.3, 0], axes="frame")},
         tolerance=1e-10,
     )
     balance = lw.loads.energy_balance(fine)

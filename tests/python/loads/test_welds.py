@@ -81,16 +81,16 @@ SIDE = lw.Frame("bracket", (0.1, 0.2, 0.3), (0.4, 0.5, 0.6))
 PUSHES = {
     "beyond alone": {"eye": lambda t: [3 * t, 1, 0, 0, 0.2, 0]},
     "constant beyond": {
-        "eye": lw.Wrench([1, 2, 3, 0.1, 0.2, 0.3], "body"),
+        "eye": lw.Wrench([1, 2, 3, 0.1, 0.2, 0.3], "frame"),
         "hook": lambda t: [3 * t, 1, 0, 0, 0.2, 0],
-        SIDE: [3, 2, 1, 0.3, 0.2, 0.1],
+        SIDE: lw.Wrench([3, 2, 1, 0.3, 0.2, 0.1], "world"),
         "boom": lambda t: [0, 1 + t, 0, 0, 0.2, 0],
     },
     "constant before": {
         "eye": lw.Wrench(lw.Table([0, 1], [[1] * 6, [2] * 6])),
         "hook": [3, 2, 1, 0.3, 0.2, 0.1],
-        SIDE: lambda t: [0, 1 + t, 0, 0, 0.2, 0],
-        "boom": lw.Wrench([1, 2, 3, 0.1, 0.2, 0.3], "body"),
+        SIDE: lw.Wrench(lambda t: [0, 1 + t, 0, 0, 0.2, 0], "world"),
+        "boom": lw.Wrench([1, 2, 3, 0.1, 0.2, 0.3], "frame"),
     },
 }
 
@@ -181,7 +181,7 @@ def leg():
 def test_nothing_but_a_wrench_beyond_a_weld(name):
     """A sensor before a foot without mass feels the ground's push alone, and none on the shank."""
     push = np.array([1.0, 2, 30, 0.1, 0.2, 0.3])
-    run = lw.simulate(leg(), duration=0.2, every=0.1, wrenches={name: lw.Wrench(push, "body")})
+    run = lw.simulate(leg(), duration=0.2, every=0.1, wrenches={name: lw.Wrench(push, "frame")})
     load = lw.loads.in_frame(run, "child", joint="ankle")
     expected = -push if name == "foot" else 0 * push
     np.testing.assert_allclose(load, [expected] * 3, rtol=0, atol=1e-12)

@@ -44,7 +44,7 @@ def test_residual_follows_the_tolerance(samples):
             times=np.linspace(0, 2, samples),
             q0=[0.3, 0.5, 0.1],
             drives={"elbow": lambda t, q, v: [2 * np.sin(3 * t)], "shoulder": lw.PD(20, 1)},
-            wrenches={"hand": lw.Wrench([2.0, 1.0, 0, 0, 0.3, 0], frame="body")},
+            wrenches={"hand": lw.Wrench([2.0, 1.0, 0, 0, 0.3, 0], axes="frame")},
             tolerance=tolerance,
         )
         found.append(residual(run))
