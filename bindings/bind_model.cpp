@@ -184,9 +184,6 @@ void bind_sizes(ModelClass& c) {
           "n_joints", [](const PyModel& s) { return s.model->n_joints(); },
           "Joints of the tree that carry a load; loads are (..., n_joints + n_loops, 6).")
       .def_prop_ro(
-          "n_loops", [](const PyModel& s) { return s.model->n_loops(); },
-          "Joints that close loops; their loads stand behind those of the tree's joints.")
-      .def_prop_ro(
           "n_bodies", [](const PyModel& s) { return s.model->n_bodies(); },
           "Bodies of the recursion: parts with mass. Fewer than n_joints where links between "
           "joints "
@@ -228,14 +225,6 @@ void bind_joints(ModelClass& c) {
          return list_per_joint(s, [](const JointInfo& j) { return j.name; });
        },
        "Joints of the tree that carry a load, in the order of all that is per joint.")
-      .def_prop_ro(
-          "loop_names",
-          [](const PyModel& s) {
-            nb::list names;
-            for (const LoopJoint& loop : s.model->loops.joints) names.append(loop.joint.name);
-            return names;
-          },
-          "Joints that close loops (n_loops,), in the order of their loads.")
       .def_prop_ro(
           "joint_types",
           [](const PyModel& s) {
@@ -308,6 +297,20 @@ void bind_joints(ModelClass& c) {
           "Mass (n_joints,) [kg] of the child link of each joint, with what was welded to it; 0 "
           "where it "
           "has none.");
+}
+
+void bind_loops(ModelClass& c) {
+  c.def_prop_ro(
+       "n_loops", [](const PyModel& s) { return s.model->n_loops(); },
+       "Joints that close loops; their loads stand behind those of the tree's joints.")
+      .def_prop_ro(
+          "loop_names",
+          [](const PyModel& s) {
+            nb::list names;
+            for (const LoopJoint& loop : s.model->loops.joints) names.append(loop.joint.name);
+            return names;
+          },
+          "Joints that close loops (n_loops,), in the order of their loads.");
 }
 
 void bind_places(ModelClass& c) {
@@ -475,6 +478,7 @@ void bind_model(nb::module_& m) {
   ModelClass c(m, "Model", "An immutable multibody tree, safe to share between threads; pickles.");
   bind_sizes(c);
   bind_joints(c);
+  bind_loops(c);
   bind_places(c);
   bind_dof_properties(c);
   bind_links(c);
