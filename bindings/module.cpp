@@ -38,6 +38,7 @@ Raises:
   linkwise::bindings::bind_model(m);
   linkwise::bindings::bind_dynamics(m);
   linkwise::bindings::bind_causes(m);
+  linkwise::bindings::bind_indeterminacy(m);
   linkwise::bindings::bind_kinematics(m);
   linkwise::bindings::bind_simulation(m);
   linkwise::bindings::bind_batch_simulation(m);

@@ -7,6 +7,7 @@ from linkwise._core import ConstraintSystem as ConstraintSystem
 from linkwise._core import DynamicsMethod as DynamicsMethod
 from linkwise._core import ForwardDynamicsResult as ForwardDynamicsResult
 from linkwise._core import Frame as Frame
+from linkwise._core import Indeterminacy as Indeterminacy
 from linkwise._core import InputError as InputError
 from linkwise._core import Model as Model
 from linkwise._core import ModelBuilder as ModelBuilder
@@ -20,6 +21,7 @@ from linkwise._core import frame_acceleration as frame_acceleration
 from linkwise._core import frame_jacobian as frame_jacobian
 from linkwise._core import frame_pose as frame_pose
 from linkwise._core import frame_velocity as frame_velocity
+from linkwise._core import indeterminacy as indeterminacy
 from linkwise._core import initial_guesses as initial_guesses
 from linkwise._core import integrators as integrators
 from linkwise._core import inverse_dynamics as inverse_dynamics

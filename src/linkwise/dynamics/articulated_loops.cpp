@@ -8,8 +8,9 @@
 namespace linkwise {
 namespace {
 
-/// Pivots of the scaled Lambda below this are zero: rounding errors leave 1e-16.
-constexpr double null_pivot = 1e-12;
+/// Pivots of the scaled Lambda below this are zero. Rounding errors leave 1e-16 of a zero; a gap of
+/// a loop, or the distance from a singular position, leaves its square.
+constexpr double null_pivot = 1e-10;
 
 /// Part of a list of ranges: bodies [begin, end).
 std::vector<KindRange> part_of(const std::vector<KindRange>& all, int begin, int end) {
@@ -223,15 +224,21 @@ double ArticulatedLoops::solve(int g, std::vector<double>& x) {
     }
   }
   const double missed = w.factor.solve(x.data(), x.data());
+  from_scaled(g, x.data());
+  return missed;
+}
+
+/// x <- L^-T x: forces from those where D is 1.
+void ArticulatedLoops::from_scaled(int g, double* x) const {
+  const auto& members = groups_[g].members;
   for (size_t m = 0; m < members.size(); ++m) {
-    const double* L = w.metric[m].data();
-    double* const own = &x[members[m].row];
+    const double* L = work_[g].metric[m].data();
+    double* const own = x + members[m].row;
     for (int i = members[m].n_rows - 1; i >= 0; --i) {
       for (int l = i + 1; l < members[m].n_rows; ++l) own[i] -= L[packed(l, i)] * own[l];
       own[i] *= L[packed(i, i)];
     }
   }
-  return missed;
 }
 
 /// What the group leaves on its top.
@@ -297,15 +304,26 @@ void ArticulatedLoops::add_known_wrenches(const SweepInput<double>& in) {
   }
 }
 
+/// Wrenches of the joints of a group on their children.
+void ArticulatedLoops::add_to_load(int g, const double* f, std::vector<Force<double>>& load) const {
+  for (const auto& member : groups_[g].members)
+    for (int i = 0; i < member.n_rows; ++i) {
+      const Force<double> Q = direction(states_[member.loop].basis.Q[i]);
+      const double x = f[member.row + i];
+      load[member.loop] += Force<double>{x * Q.lin, x * Q.ang};
+    }
+}
+
+void ArticulatedLoops::store_loop_load(int l, const Force<double>& w, double* loads) const {
+  const Vector6<double> user =
+      to_array(inverse_transpose_times(model_.loops.joints[l].joint.to_user, w));
+  std::copy(user.begin(), user.end(), loads + 6 * l);
+}
+
 void ArticulatedLoops::store_loop_loads(const SweepInput<double>& in, double* loads) const {
   std::vector<Force<double>> load(model_.n_loops());
-  for (size_t g = 0; g < groups_.size(); ++g)
-    for (const auto& member : groups_[g].members)
-      for (int i = 0; i < member.n_rows; ++i) {
-        const Force<double> Q = direction(states_[member.loop].basis.Q[i]);
-        const double f = work_[g].f[member.row + i];
-        load[member.loop] += Force<double>{f * Q.lin, f * Q.ang};
-      }
+  for (int g = 0; g < static_cast<int>(groups_.size()); ++g)
+    add_to_load(g, work_[g].f.data(), load);
   for (int l = 0; l < model_.n_loops(); ++l) {
     const LoopState& loop = states_[l];
     for (int k = 0; in.loop_tau && k < loop.basis.n; ++k) {
@@ -313,10 +331,27 @@ void ArticulatedLoops::store_loop_loads(const SweepInput<double>& in, double* lo
       const double tau = in.loop_tau[loop.dof[k]];
       load[l] += Force<double>{tau * dual.lin, tau * dual.ang};
     }
-    const Vector6<double> user =
-        to_array(inverse_transpose_times(model_.loops.joints[l].joint.to_user, load[l]));
-    std::copy(user.begin(), user.end(), loads + 6 * l);
+    store_loop_load(l, load[l], loads);
   }
+}
+
+void ArticulatedLoops::self_stress(int g, int k, const double* q, double* loads) const {
+  const Work& w = work_[g];
+  std::vector<double> f(groups_[g].rows);
+  w.factor.null_vector(k, f.data());
+  from_scaled(g, f.data());
+  std::vector<Force<double>> of_body(model_.n_bodies()), of_loop(model_.n_loops());
+  for (const auto& carrier : groups_[g].carriers)
+    for (size_t i = 0; i < carrier.rows.size(); ++i) {
+      const Force<double>& F = w.columns[carrier.first + i].F;
+      const double x = f[carrier.rows[i]];
+      of_body[carrier.body] -= Force<double>{x * F.lin, x * F.ang};
+    }
+  store_joint_loads(
+      model_, q, [&](int n) { return of_body[n]; }, loads);
+  add_to_load(g, f.data(), of_loop);
+  for (int l = 0; l < model_.n_loops(); ++l)
+    store_loop_load(l, of_loop[l], loads + 6 * model_.n_joints());
 }
 
 }  // namespace linkwise

@@ -31,7 +31,12 @@ class ArticulatedLoops {
   const LoopStates& states() const { return states_; }
   const std::vector<LoopGroup>& groups() const { return groups_; }
 
-  /// What the last evaluation knows of a group: for those that ask which loads are determinate.
+  // Of the last evaluation, with loads: forces of a group that cancel.
+  int n_self_stresses(int group) const { return groups_[group].rows - work_[group].factor.rank(); }
+  /// Joint loads [n_loads][6] of self-stress k.
+  void self_stress(int group, int k, const double* q, double* loads) const;
+
+ private:
   struct Work {
     std::vector<LoopColumn<double>> columns;
     std::vector<Force<double>> Psi;              ///< [rows] on the top
@@ -40,9 +45,7 @@ class ArticulatedLoops {
     std::vector<std::array<double, 21>> metric;  ///< factor of D by member
     SemidefiniteFactor factor;
   };
-  const Work& work(int group) const { return work_[group]; }
 
- private:
   void carry(const SweepInput<double>& in, int g);
   void place_forces(int g);
   void factor(int g);
@@ -50,7 +53,10 @@ class ArticulatedLoops {
   void reduce_top(int g);
   void solve_forces(const SweepInput<double>& in, int g, bool with_loads);
   void add_known_wrenches(const SweepInput<double>& in);
+  void from_scaled(int g, double* x) const;
+  void add_to_load(int g, const double* f, std::vector<Force<double>>& load) const;
   void store_loop_loads(const SweepInput<double>& in, double* loads) const;
+  void store_loop_load(int l, const Force<double>& w, double* loads) const;
 
   const Model& model_;
   TreeSweeps<double> sweeps_;

@@ -110,6 +110,16 @@ struct LoopedMachine {
     model.loops.joints.push_back(loop);
   }
 
+  /// Adds a wrench on a body, in its frame, to external wrenches [n_joints][6] of users' frames.
+  void push(int body, const Force<double>& w, std::vector<double>& external) const {
+    for (int j = 0; j < tree.n_joints(); ++j) {
+      const JointInfo& joint = tree.joints[j];
+      if (joint.body != body || !joint.last_of_body) continue;
+      const auto user = to_array(inverse_transpose_times(joint.to_user, w));
+      for (int i = 0; i < 6; ++i) external[6 * j + i] += user[i];
+    }
+  }
+
   SweepInput<double> input() const {
     SweepInput<double> in;
     in.q = q.data();

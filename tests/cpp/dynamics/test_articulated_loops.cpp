@@ -140,22 +140,14 @@ void expect_motion(const LoopedMachine& machine, std::uint64_t seed, int want_ra
     EXPECT_LT(violation(machine, kernel.states(), l, du), 1e-9 * size) << "loop " << l;
 
   std::vector<double> external = c.external;
-  const auto push = [&](int body, const Force<double>& w) {
-    for (int j = 0; j < machine.tree.n_joints(); ++j) {
-      const JointInfo& joint = machine.tree.joints[j];
-      if (joint.body != body || !joint.last_of_body) continue;
-      const auto user = to_array(inverse_transpose_times(joint.to_user, w));
-      for (int i = 0; i < 6; ++i) external[6 * j + i] += user[i];
-    }
-  };
   double largest = 1;
   for (int l = 0; l < model.n_loops(); ++l) {
     const LoopJoint& loop = model.loops.joints[l];
     const LoopState& at = kernel.states()[l];
     const Force<double> w = transpose_times(
         loop.joint.to_user, to_force(&loads[6 * (static_cast<size_t>(model.n_joints()) + l)]));
-    push(loop.joint.body, transpose_times(loop.on_child, w));
-    push(loop.parent_body, wrench_on_a(at, w));
+    machine.push(loop.joint.body, wrench_on_b(loop, w), external);
+    machine.push(loop.parent_body, wrench_on_a(at, w), external);
     for (const double x : to_array(w)) largest = std::max(largest, std::abs(x));
   }
   const auto want = WorldTwin(machine.tree).inverse_dynamics(machine.q, machine.v, du, external);

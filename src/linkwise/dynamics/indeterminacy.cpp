@@ -1,0 +1,64 @@
+#include "linkwise/dynamics/indeterminacy.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/dynamics/articulated_loops.hpp"
+
+namespace linkwise {
+namespace {
+
+/// Of the largest component of a self-stress: what is less is rounding.
+constexpr double touched = 1e-8;
+
+double longest_loop(const Model& model, const LoopStates& states) {
+  double length = 0;
+  for (int l = 0; l < model.n_loops(); ++l) length = std::max(length, states[l].length);
+  return length;
+}
+
+/// Makes the largest component 1, where moments count by a length.
+void normalise(double* loads, size_t n_loads, double length) {
+  double largest = 0;
+  for (size_t i = 0; i < 6 * n_loads; ++i)
+    largest = std::max(largest, std::abs(loads[i]) / (i % 6 < 3 ? 1 : length));
+  for (size_t i = 0; i < 6 * n_loads; ++i) loads[i] /= largest;
+}
+
+}  // namespace
+
+Indeterminacy find_indeterminacy(const Model& model, const double* q) {
+  Indeterminacy out;
+  const size_t n_loads = model.n_loads();
+  out.determinate.assign(6 * n_loads, 1);
+  for (const Element& e : model.elements) out.mobility += e.prescribed ? 0 : e.nv;
+  if (model.n_loops() == 0) return out;
+  ArticulatedLoops kernel(model);
+  const std::vector<double> zero(model.nv());
+  std::vector<double> du(model.nv()), loads(6 * n_loads);
+  SweepInput<double> in;
+  in.q = q;
+  in.tau = zero.data();
+  const bool regular = kernel.evaluate(in, du.data(), loads.data());
+  require_closed(model, kernel.states());
+  if (!regular)
+    throw InputError("body '" + model.body_name(kernel.failed_body()) + "'" + model.where() +
+                     ": its articulated inertia is not positive definite; give it mass and "
+                     "inertia");
+  out.rows = kernel.report().rows;
+  out.rank = kernel.report().rank;
+  out.mobility -= out.rank;
+  const double length = longest_loop(model, kernel.states());
+  for (int g = 0; g < static_cast<int>(kernel.groups().size()); ++g)
+    for (int k = 0; k < kernel.n_self_stresses(g); ++k) {
+      kernel.self_stress(g, k, q, loads.data());
+      normalise(loads.data(), n_loads, length);
+      for (size_t i = 0; i < loads.size(); ++i)
+        if (std::abs(loads[i]) > touched * (i % 6 < 3 ? 1 : length)) out.determinate[i] = 0;
+      out.self_stresses.insert(out.self_stresses.end(), loads.begin(), loads.end());
+    }
+  return out;
+}
+
+}  // namespace linkwise

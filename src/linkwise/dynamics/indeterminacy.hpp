@@ -1,0 +1,27 @@
+#pragma once
+// Which joint loads rigid bodies determine. Constraints that repeat each other let forces through
+// that cancel inside the loops and move nothing: self-stresses, the null vectors N of Lambda. Any
+// multiple may be added to the loads [wojtyra2005]. A component that no self-stress touches is
+// determinate: no choice of forces changes it.
+#include <vector>
+
+#include "linkwise/model/model.hpp"
+
+namespace linkwise {
+
+struct Indeterminacy {
+  int rows = 0;      ///< directions that loop joints hold
+  int rank = 0;      ///< how many of them are independent
+  int mobility = 0;  ///< degrees of freedom that are left
+  /// Joint loads of independent self-stresses, each with its largest force, or moment over the
+  /// loops' length, 1: [rows - rank][n_loads][6], in the users' frames as joint loads are.
+  std::vector<double> self_stresses;
+  std::vector<char> determinate;  ///< [n_loads][6]
+
+  int n_self_stresses() const { return rows - rank; }
+};
+
+/// At position q, which must close the loops: InputError otherwise.
+Indeterminacy find_indeterminacy(const Model& model, const double* q);
+
+}  // namespace linkwise
