@@ -208,6 +208,10 @@ void bind_simulation(nb::module_& m) {
           "stiffness", [](const PySimulation& s) { return s.simulation.stiffness(); },
           "Since when the motion is stiff and what follows, one line; empty where nothing was "
           "noticed.")
+      .def_prop_ro(
+          "force_doubt", [](const PySimulation& s) { return s.simulation.force_doubt(); },
+          "Where gains make too much force of the errors of steps, one line; empty where they do "
+          "not.")
       .def(
           "keep_trace",
           [](PySimulation& s, bool wanted) {

@@ -276,3 +276,38 @@ def test_machines_of_a_batch_keep_their_own_properties(winch):
         alone = lw.simulate(model, **options).position.isel(time=-1).values
         np.testing.assert_allclose(ours, alone, rtol=1e-9)
     assert len({tuple(row) for row in found.round(6)}) == 4
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"limit_damping": 0.5}, "limit_damping has no effect, because limit_stiffness is zero"),
+        ({"friction_velocity": 0.1}, "friction_velocity has no effect, because friction is zero"),
+        ({"rest_position": 0.2}, "rest_position has no effect, because stiffness is zero"),
+        ({"limit_stiffness": 1e4, "lower": -np.inf, "upper": np.inf}, "the range has no ends"),
+        ({"limit_damping": 0.5, "limit_stiffness": 1e4}, None),
+        ({"friction_velocity": 0.1, "friction": 2.0}, None),
+        ({"rest_position": 0.2, "stiffness": 5.0}, None),
+        ({"limit_stiffness": 1e4, "upper": np.inf}, None),
+    ],
+)
+def test_what_does_nothing_is_said(winch, given, said):
+    notes = [
+        note.text
+        for note in winch.with_joint("rope", **given).notes
+        if note.level == "warning" and note.element == "rope"
+    ]
+    assert len(notes) == (said is not None)
+    assert said is None or said in notes[0]
+
+
+def test_one_value_for_several_serves_those_that_need_it():
+    builder = lw.ModelBuilder("ball")
+    builder.add_link("ground")
+    builder.add_link("ball", mass=1.0, inertia=np.eye(3))
+    some = {"friction": [1.0, 0, 0], "friction_velocity": 0.1}
+    builder.add_joint("hip", "spherical", "ground", "ball", **some)
+    assert not builder.build().notes
+    each = {"friction_velocity": [0.1, 0.1, 0.1]}
+    (note,) = builder.build().with_joint("hip", **each).notes
+    assert note.text.startswith("friction_velocity has no effect")

@@ -222,7 +222,8 @@ def _properties(mj_model: Any, joint: int, added: Transmissions) -> dict[str, An
     if _enabled(mj_model, "SPRING"):
         stiffness, rest = float(mj_model.jnt_stiffness[joint]), float(mj_model.qpos_spring[address])
         result["stiffness"], rest = added.spring(dofs.start, stiffness, rest)
-        result["rest_position"] = rest - zero
+        if result["stiffness"]:
+            result["rest_position"] = rest - zero
     if mj_model.jnt_limited[joint]:
         lower, upper = mj_model.jnt_range[joint] - zero
         result |= {"lower": float(lower), "upper": float(upper)}

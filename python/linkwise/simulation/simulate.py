@@ -200,20 +200,21 @@ def _record(
         # full.
         said = {"outcome": "error", "message": f"{type(error).__name__}: {error}"}
         with contextlib.suppress(Exception):
-            said |= warning_attrs([*_stiffness(simulation), *ignored])
+            said |= warning_attrs([*_noticed(simulation), *ignored])
             record.finish(said, _extremes(simulation, schema))
         raise
     attrs = _attributes_at_end(simulation, clock.monotonic() - started)
     doubt = solver_doubt(simulation.statistics.solver_error)
     attrs["solver_error"] = "bounded" if doubt is None else "not bounded"
-    noticed = [*_stiffness(simulation), *ignored, *([] if doubt is None else [doubt])]
+    noticed = [*_noticed(simulation), *ignored, *([] if doubt is None else [doubt])]
     finished = record.finish(attrs | warning_attrs(noticed), _extremes(simulation, schema))
     return Run(finished, record.path, model), ending
 
 
-def _stiffness(simulation: Simulation) -> list[Ignored]:
-    """What the integrator noticed about stiffness, for the run's warnings."""
-    return [Ignored("", "integrator", simulation.stiffness)] if simulation.stiffness else []
+def _noticed(simulation: Simulation) -> list[Ignored]:
+    """What was noticed about stiffness and about forces of large gain, for the run's warnings."""
+    said = {"integrator": simulation.stiffness, "forces": simulation.force_doubt}
+    return [Ignored("", element, text) for element, text in said.items() if text]
 
 
 def _attributes_at_end(simulation: Simulation, wall_time: float) -> dict[str, Any]:
@@ -328,8 +329,9 @@ def simulate(
 
     What was ignored or assumed when the model was made is in `run.warnings`, and a ModelWarning
     each where `linkwise.load` did not say it. `run.warnings` also names tables that do not cover
-    the run, functions whose short changes may be missed, since when the motion is stiff, and an
-    iterative solver whose errors are not bounded.
+    the run, functions whose short changes may be missed, since when the motion is stiff, forces
+    whose gain is so large that they are not known well, and an iterative solver whose errors are
+    not bounded.
     """
     sampled = sample_times(duration, every, times)
     start = (

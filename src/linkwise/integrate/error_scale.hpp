@@ -8,8 +8,8 @@
 
 namespace linkwise {
 
-/// What an error of each component of y is measured by: rtol scale + atol. Nothing is held better
-/// than rounding lets it be: angles after millions of turns.
+/// What an error of each component of y is measured by: rtol scale + atol, or less where the system
+/// asks for it. Nothing is held better than rounding lets it be: angles after millions of turns.
 inline void tolerated_errors(const OdeSystem& system, const IntegratorOptions& options,
                              std::span<const double> y, double* out) {
   constexpr double rounding = 64 * std::numeric_limits<double>::epsilon();
@@ -19,8 +19,9 @@ inline void tolerated_errors(const OdeSystem& system, const IntegratorOptions& o
       options.absolute_tolerance > 0.0 ? options.absolute_tolerance : options.tolerance;
   system.error_scale(y.data(), out);
   for (std::size_t i = 0; i < y.size(); ++i) out[i] *= relative;
-  for (std::size_t i = 0; i < y.size(); ++i)
-    out[i] = std::max(out[i] + absolute, rounding * std::abs(y[i]));
+  for (std::size_t i = 0; i < y.size(); ++i) out[i] += absolute;
+  system.limit_errors(y.data(), out);
+  for (std::size_t i = 0; i < y.size(); ++i) out[i] = std::max(out[i], rounding * std::abs(y[i]));
 }
 
 }  // namespace linkwise

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -46,11 +47,25 @@ struct OdeSystem {
     for (int i = 0; i < size(); ++i) scale[i] = std::abs(y[i]);
   }
 
+  /// Lowers the errors that a step may make, allowed [size()], where more than the state suffers.
+  virtual void limit_errors(const double* /*y*/, double* /*allowed*/) const {}
+
   /// The latest time at which a step that begins at t may end: what acts from outside takes another
   /// course there, which evaluations before and after it would not show. Infinite: none is known.
   virtual double step_limit(double /*t*/) { return std::numeric_limits<double>::infinity(); }
   /// Whether f(t, y) or a low derivative of it jumps at time t, so that methods begin anew there.
   virtual bool breaks_at(double /*t*/) { return false; }
+
+  /// Whether the step from `begin` to `end`, where it is y, has to be taken again, because it has
+  /// passed what it should have met. step_limit(begin) then says where it ends. state(t, y) writes
+  /// what the step says of a time within it.
+  virtual bool retakes(double /*begin*/, double /*end*/, const double* /*y*/,
+                       const std::function<void(double, double*)>& /*state*/) {
+    return false;
+  }
+
+  /// Whether derivatives of f have jumped in the step accepted last, so that none before it hold.
+  virtual bool has_jumped() const { return false; }
 
   /// Called after each accepted step, with y projected.
   virtual void accepted(double /*t*/, const double* /*y*/) {}

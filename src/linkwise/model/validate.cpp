@@ -108,9 +108,13 @@ void validate(ModelSpec& spec, std::vector<Note>& notes) {
     throw InputError("model '" + spec.name + "'" + where +
                      ": gravity is not finite; give three finite numbers in m/s2");
   for (const LinkSpec& link : spec.links) validate_link(link, where, notes);
-  for (JointSpec& joint : spec.joints) validate_joint(joint, where);
+  for (JointSpec& joint : spec.joints) {
+    validate_joint(joint, where);
+    note_idle(joint, notes);
+  }
   for (LoopJointSpec& loop : spec.loop_joints) {
     validate_joint(loop.joint, where);
+    note_idle(loop.joint, notes);
     const std::string head = "joint '" + loop.joint.name + "'" + where + ": ";
     if (!finite(loop.child_translation))
       throw InputError(head + "child_translation is not finite; give three finite numbers in m");
@@ -119,6 +123,59 @@ void validate(ModelSpec& spec, std::vector<Note>& notes) {
       throw InputError(head + "length is " + number_text(loop.rod_length) +
                        "; give the length of the rod in m, more than 0");
   }
+}
+
+namespace {
+
+/// A property that does nothing without another one.
+struct Dependent {
+  DofProperty property, needed;
+};
+constexpr Dependent dependents[] = {
+    {DofProperty::limit_damping, DofProperty::limit_stiffness},
+    {DofProperty::friction_velocity, DofProperty::friction},
+    {DofProperty::rest_position, DofProperty::stiffness},
+};
+
+/// Of degree of freedom i.
+double value_of(const JointSpec& joint, DofProperty property, size_t i) {
+  double value = dof_property_table[static_cast<int>(property)].fallback;
+  for (const DofValue& given : joint.dof)
+    if (given.property == property && !given.values.empty())
+      value = given.values[std::min(i, given.values.size() - 1)];
+  return value;
+}
+
+}  // namespace
+
+void note_idle(const JointSpec& joint, std::vector<Note>& notes) {
+  const size_t nv = joint_dof(joint);
+  const auto warn = [&](std::string text) {
+    notes.push_back({NoteLevel::warning, joint.name, std::move(text)});
+  };
+  for (const auto [property, needed] : dependents) {
+    const DofPropertyEntry& entry = dof_property_table[static_cast<int>(property)];
+    size_t idle = 0;
+    for (size_t i = 0; i < nv; ++i)
+      idle += value_of(joint, property, i) != entry.fallback && value_of(joint, needed, i) == 0;
+    // One value stands for all degrees of freedom, and serves those that need it.
+    bool apart = false;
+    for (const DofValue& given : joint.dof)
+      apart |= given.property == property && given.values.size() > 1;
+    if (idle > 0 && (apart || idle == nv)) {
+      const std::string other = dof_property_table[static_cast<int>(needed)].name;
+      warn(std::string(entry.name) + " has no effect, because " + other + " is zero; give " +
+           other + " as well, or leave both out");
+    }
+  }
+  bool stiff = false, ranged = false;
+  for (size_t i = 0; i < nv; ++i) {
+    stiff |= value_of(joint, DofProperty::limit_stiffness, i) > 0;
+    ranged |= std::isfinite(value_of(joint, DofProperty::lower, i)) ||
+              std::isfinite(value_of(joint, DofProperty::upper, i));
+  }
+  if (stiff && !ranged)
+    warn("limit_stiffness has no effect, because the range has no ends; give lower or upper");
 }
 
 void validate_link(const LinkSpec& link, const std::string& where, std::vector<Note>& notes) {

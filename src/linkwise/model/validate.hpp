@@ -28,6 +28,9 @@ void require_rotation(const Mat3<double>& R, const std::string& what);
 /// axis; normalises the axes.
 void validate_joint(JointSpec& joint, const std::string& where);
 
+/// Adds a warning note on each property that does nothing because another one is missing.
+void note_idle(const JointSpec& joint, std::vector<Note>& notes);
+
 /// Appends the joint's properties, one value per degree of freedom, to the model's arrays. Throws
 /// InputError on values of the wrong number or sign, or limits that are swapped.
 void append_dof_properties(const JointSpec& joint, const std::string& where,

@@ -9,6 +9,7 @@
 #include "linkwise/dynamics/batch.hpp"
 #include "linkwise/simulate/applied_forces.hpp"
 #include "linkwise/simulate/extremes.hpp"
+#include "linkwise/simulate/force_accuracy.hpp"
 #include "linkwise/simulate/parent_axes.hpp"
 #include "linkwise/simulate/quantity.hpp"
 #include "linkwise/simulate/setup.hpp"
@@ -69,6 +70,8 @@ class Simulation : private OdeSystem {
   SimulationStatistics statistics() const;
   /// As Integrator::stiffness().
   std::string stiffness() const { return integrator_ ? integrator_->stiffness() : std::string(); }
+  /// As ForceAccuracy::doubt().
+  std::string force_doubt() const { return accuracy_ ? accuracy_->doubt() : std::string(); }
   /// Ends what still runs.
   void stop(Outcome outcome) { end_all({outcome, integrator_->time(), "", describe(outcome)}); }
 
@@ -102,10 +105,17 @@ class Simulation : private OdeSystem {
   Outcome project(double t, double* y) override;
   void accepted(double t, const double* y) override;
   void error_scale(const double* y, double* scale) const override;
-  double step_limit(double t) override { return step_limits_->after(t); }
+  void limit_errors(const double* y, double* allowed) const override;
+  double step_limit(double t) override;
+  bool has_jumped() const override { return accuracy_ && accuracy_->has_jumped(); }
+  bool retakes(double begin, double end, const double* y,
+               const std::function<void(double, double*)>& state) override;
   bool breaks_at(double t) override { return step_limits_->breaks_at(t); }
 
   void make_methods(double t0);
+  void watch_forces();
+  void keep_acting(const double* ydot);
+  void weigh_forces(double t, const double* y);
   bool follows_error_test() const;
   SweepInput<double> input(double t, const double* q, const double* v);
   BatchInput rows(const double* y, size_t member) const;
@@ -145,6 +155,7 @@ class Simulation : private OdeSystem {
   size_t members_ = 1;
   std::optional<AppliedForces> forces_;
   std::optional<StepLimits> step_limits_;
+  std::optional<ForceAccuracy> accuracy_;  ///< of one member, with an error test
   /// Of one member; loads at output times are computed apart, to the fixed tolerance.
   std::unique_ptr<DynamicsMethod> method_, output_method_;
   std::unique_ptr<DynamicsMethod> aside_method_, work_method_;  ///< made when first needed
@@ -160,6 +171,8 @@ class Simulation : private OdeSystem {
   double extremes_until_ = 0, advanced_to_ = 0;
   bool sampled_ = false;  ///< since the start
   /// Rows per member: state, that of an evaluation, given accelerations, samples.
+  std::vector<double> acting_;  ///< of the last evaluation: derivatives of the rates, torques
+  std::vector<double> scale_;
   std::vector<double> y_, evaluated_, given_, du_, loads_, total_;
   std::vector<double> start_;  ///< positions there
   std::vector<Ending> endings_;

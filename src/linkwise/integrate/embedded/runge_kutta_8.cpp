@@ -102,9 +102,9 @@ Outcome RungeKutta8::begin() {
   return Outcome::converged;
 }
 
-Outcome RungeKutta8::step(double /*t_limit*/) {
+Outcome RungeKutta8::step(double t_limit) {
   if (options_.max_steps > 0 && steps_ >= options_.max_steps) return Outcome::too_many_steps;
-  const double limit = system_.begin_step(time_);
+  const double from = time_, limit = system_.begin_step(from);
   if (begins_)
     if (const Outcome outcome = begin(); outcome != Outcome::converged) return outcome;
   previous_ = y_;
@@ -141,6 +141,14 @@ Outcome RungeKutta8::step(double /*t_limit*/) {
   }
   ++steps_;
   polynomial_made_ = false;
+  const auto state_at = [this](double at, double* y) { interpolate(at, {y, y_.size()}); };
+  if (system_->retakes(from, time_, y_.data(), state_at)) {
+    --steps_;
+    time_ = from;
+    y_ = previous_;
+    k_[0].swap(k_[end_rate]);
+    return step(t_limit);
+  }
   begins_ = time_ == limit && system_->breaks_at(time_);
   system_->accepted(time_, y_.data());
   return Outcome::converged;

@@ -62,6 +62,9 @@ class Past final : public OdeSystem {
   bool constrained() const override { return system_.constrained(); }
   Outcome project(double t, double* y) override { return system_.project(t, y); }
   void error_scale(const double* y, double* scale) const override { system_.error_scale(y, scale); }
+  void limit_errors(const double* y, double* allowed) const override {
+    system_.limit_errors(y, allowed);
+  }
   double step_limit(double t) override { return std::min(system_.step_limit(t), end_); }
   bool breaks_at(double t) override { return system_.breaks_at(t); }
 

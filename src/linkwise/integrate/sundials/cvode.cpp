@@ -172,9 +172,9 @@ Outcome Cvode::project(double t, const double* y) {
   return system_->project(t, projected_.data());
 }
 
-/// 1 / (rtol scale + atol). CVODE asks for it at the begin of every step with its own y, the
-/// first column of its history, in its hands. For Adams the other columns hold rates alone, so
-/// this is where the step is made to start from the projected state.
+/// 1 / (rtol scale + atol), or more where the system asks for it. CVODE asks for it at the begin of
+/// every step with its own y, the first column of its history, in its hands. For Adams the other
+/// columns hold rates alone, so this is where the step is made to start from the projected state.
 int Cvode::error_weights(N_Vector y, N_Vector weight, void* self) {
   Cvode& cvode = *static_cast<Cvode*>(self);
   double* value = N_VGetArrayPointer(y);
@@ -212,11 +212,17 @@ void Cvode::restart() {
   write_back_ = false;
 }
 
-Outcome Cvode::step(double /*t_limit*/) {
+Outcome Cvode::step(double t_limit) {
   if (options_.max_steps > 0 && earlier_.steps + counters_.steps >= options_.max_steps) {
     return Outcome::too_many_steps;
   }
   if (restart_needed_) restart();
+  // Newton's iteration seems to converge where an old matrix is far too large.
+  if (method_ == CV_BDF) {
+    const bool afresh = system_->has_jumped();
+    CVodeSetLSetupFrequency(memory_.get(), afresh ? 1 : 0);
+    CVodeSetJacEvalFrequency(memory_.get(), afresh ? 1 : 0);
+  }
   const double limit = system_.begin_step(time_);
   check(CVodeSetStopTime(memory_.get(), std::min(limit, never)), "CVodeSetStopTime");
   // CVODE bounds its very first step by a tenth of the distance to this time and ignores it
@@ -232,6 +238,14 @@ Outcome Cvode::step(double /*t_limit*/) {
   // CVODE goes on with steps that round-off swallows; nothing would ever end it.
   if (!(t > time_ + 4.0 * std::numeric_limits<double>::epsilon() * std::abs(time_))) {
     return no_smaller_step();
+  }
+  const auto state_at = [this](double at, double* y) {
+    check(CVodeGetDky(memory_.get(), at, 0, scratch_.get()), "CVodeGetDky");
+    std::copy_n(data(scratch_), size(), y);
+  };
+  if (system_->retakes(time_, t, data(y_), state_at)) {
+    restart();
+    return step(t_limit);
   }
   if (const Outcome outcome = take_state(t); outcome != Outcome::converged) return outcome;
   time_ = t;
