@@ -49,6 +49,30 @@ void add_joint(ModelBuilder& builder, std::string name, const std::string& type,
                     type, pitch, properties_from(properties));
 }
 
+/// A chain of equal links made without Python objects: N in the millions.
+PyModel* chain_of(size_t n, const std::string& joint, nb::handle axes, nb::handle translation,
+                  double mass, nb::handle com, nb::handle inertia, nb::handle gravity,
+                  double damping, double armature, bool floating_base) {
+  const ArrayIn axis_list = as_array(axes, "axes");
+  if (axis_list.ndim() != 2 || axis_list.shape(1) != 3 || axis_list.shape(0) == 0)
+    throw InputError("axes has shape " + shape_text(shape_of(axis_list)) +
+                     " but shape (k, 3) is expected");
+  EqualChain chain;
+  chain.n_links = n;
+  chain.joint = joint_type_from_name(joint);
+  for (const double* a = axis_list.data(); a != axis_list.data() + axis_list.size(); a += 3)
+    chain.axes.push_back({a[0], a[1], a[2]});
+  chain.translation = vec3(translation, "translation");
+  chain.link = link_spec("", mass, com, inertia);
+  chain.gravity = vec3(gravity, "gravity");
+  chain.damping = damping;
+  chain.armature = armature;
+  chain.floating_base = floating_base;
+  return new PyModel(make_chain(chain));
+}
+
+}  // namespace
+
 void add_loop(ModelBuilder& builder, std::string name, const std::string& type, std::string parent,
               std::string child, nb::handle translation, nb::handle rotation,
               nb::handle child_translation, nb::handle child_rotation, nb::handle axis,
@@ -82,30 +106,6 @@ void add_coupling(ModelBuilder& builder, std::string name, const nb::dict& facto
         {name_in(nb::borrow(joint), "a coupled joint"), real_number(factor, "factor")});
   builder.add_coupling(std::move(coupling));
 }
-
-/// A chain of equal links made without Python objects: N in the millions.
-PyModel* chain_of(size_t n, const std::string& joint, nb::handle axes, nb::handle translation,
-                  double mass, nb::handle com, nb::handle inertia, nb::handle gravity,
-                  double damping, double armature, bool floating_base) {
-  const ArrayIn axis_list = as_array(axes, "axes");
-  if (axis_list.ndim() != 2 || axis_list.shape(1) != 3 || axis_list.shape(0) == 0)
-    throw InputError("axes has shape " + shape_text(shape_of(axis_list)) +
-                     " but shape (k, 3) is expected");
-  EqualChain chain;
-  chain.n_links = n;
-  chain.joint = joint_type_from_name(joint);
-  for (const double* a = axis_list.data(); a != axis_list.data() + axis_list.size(); a += 3)
-    chain.axes.push_back({a[0], a[1], a[2]});
-  chain.translation = vec3(translation, "translation");
-  chain.link = link_spec("", mass, com, inertia);
-  chain.gravity = vec3(gravity, "gravity");
-  chain.damping = damping;
-  chain.armature = armature;
-  chain.floating_base = floating_base;
-  return new PyModel(make_chain(chain));
-}
-
-}  // namespace
 
 LinkSpec link_spec(std::string name, double mass, nb::handle com, nb::handle inertia) {
   return make_link(std::move(name), mass, com.is_none() ? Vec3<double>{} : vec3(com, "com"),

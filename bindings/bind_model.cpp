@@ -1,10 +1,13 @@
 // Model: what it holds, by name, and the same machine changed.
+#include <algorithm>
+
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include "bind.hpp"
 #include "frame.hpp"
+#include "joint_lists.hpp"
 #include "linkwise/model/builder.hpp"
 #include "numbers.hpp"
 #include "printable.hpp"
@@ -19,12 +22,6 @@ nb::list list_per_joint(const PyModel& self, F&& f) {
   nb::list out;
   for (const JointInfo& joint : self.model->joints) out.append(f(joint));
   return out;
-}
-
-nb::tuple to_tuple(const std::vector<ScalarLabel>& labels) {
-  nb::list out;
-  for (const ScalarLabel& label : labels) out.append(nb::make_tuple(label.suffix, label.unit));
-  return nb::tuple(out);
 }
 
 nb::bytes to_bytes(const ModelSpec& spec) {
@@ -72,8 +69,6 @@ nb::list welds(const PyModel& self) {
   return out;
 }
 
-using ModelClass = nb::class_<PyModel>;
-
 /// The same machine with a body welded to one of its links.
 PyModel* payload_on(const PyModel& self, const std::string& link, double mass, nb::handle com,
                     nb::handle inertia, const std::string& name) {
@@ -96,6 +91,11 @@ PyModel* with_link(const PyModel& self, const std::string& link, nb::handle mass
   return new PyModel(std::move(spec));
 }
 
+bool closes_loop(const Model& model, const std::string& joint) {
+  return std::any_of(model.loops.joints.begin(), model.loops.joints.end(),
+                     [&](const LoopJoint& loop) { return loop.joint.name == joint; });
+}
+
 PyModel* joints_on(const PyModel& self, const nb::dict& joints) {
   std::vector<std::pair<std::string, Properties>> given;
   for (auto [key, value] : joints) {
@@ -103,7 +103,8 @@ PyModel* joints_on(const PyModel& self, const nb::dict& joints) {
     if (!nb::try_cast(key, joint) || !nb::isinstance<nb::dict>(value))
       throw InputError(
           "joint properties are no dict of dicts; give {\"elbow\": {\"armature\": 0.1}}");
-    self.model->joint_index(joint);  // names what is unknown or merged
+    if (!closes_loop(*self.model, joint))
+      self.model->joint_index(joint);  // names what is unknown or merged
     given.emplace_back(std::move(joint), properties_from(nb::borrow<nb::dict>(value)));
   }
   return new PyModel(with_joints(self.model->spec(), std::move(given)));
@@ -136,17 +137,7 @@ std::string hash_of(const PyModel& self) {
 
 nb::list joint_axes(const PyModel& self) {
   nb::list out;
-  for (int j = 0; j < self.model->n_joints(); ++j) {
-    const JointSpec& joint = self.model->joint_spec(j);
-    nb::list axes;
-    for (int k = 0; k < n_joint_elements(joint); ++k) {
-      const JointElement element = joint_element(joint, k);
-      if (element.axis < 0) continue;
-      const Vec3<double>& a = joint.axes[element.axis].axis;
-      axes.append(nb::make_tuple(info_of(element.kind).axis, nb::make_tuple(a.x, a.y, a.z)));
-    }
-    out.append(axes);
-  }
+  for (int j = 0; j < self.model->n_joints(); ++j) out.append(axes_of(self.model->joint_spec(j)));
   return out;
 }
 
@@ -257,8 +248,7 @@ void bind_joints(ModelClass& c) {
               throw InputError("joint " + std::to_string(joint) +
                                " is out of range; the model has " +
                                std::to_string(s.model->n_joints()) + " joints");
-            const JointSpec& spec = s.model->joint_spec(joint);
-            return nb::make_tuple(to_tuple(coordinate_labels(spec)), to_tuple(rate_labels(spec)));
+            return labels_of(s.model->joint_spec(joint));
           },
           "joint"_a,
           "Suffix and unit of each coordinate of a joint, and of each of its rates (the unit of "
@@ -475,10 +465,11 @@ bytes that are no model.)")
 }  // namespace
 
 void bind_model(nb::module_& m) {
-  ModelClass c(m, "Model", "An immutable multibody tree, safe to share between threads; pickles.");
+  ModelClass c(m, "Model", "An immutable multibody model, safe to share between threads; pickles.");
   bind_sizes(c);
   bind_joints(c);
   bind_loops(c);
+  bind_loop_joints(c);
   bind_places(c);
   bind_dof_properties(c);
   bind_links(c);

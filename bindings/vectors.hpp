@@ -30,4 +30,14 @@ LinkSpec link_spec(std::string name, double mass, nb::handle com, nb::handle ine
 /// Joint properties by name, each a number, an array, or None.
 Properties properties_from(const nb::dict& given);
 
+/// Adds a joint that closes a loop; what is None stays as it is without.
+void add_loop(ModelBuilder& builder, std::string name, const std::string& type, std::string parent,
+              std::string child, nb::handle translation, nb::handle rotation,
+              nb::handle child_translation, nb::handle child_rotation, nb::handle axis,
+              nb::handle axes, double pitch, const nb::kwargs& properties);
+
+void add_rod(ModelBuilder& builder, std::string name, std::string parent, std::string child,
+             double length, nb::handle point, nb::handle child_point);
+void add_coupling(ModelBuilder& builder, std::string name, const nb::dict& factors, double offset);
+
 }  // namespace linkwise::bindings
