@@ -1,0 +1,149 @@
+"""Published machines: loops are closed where they start, bodies weigh as published."""
+
+import numpy as np
+import pytest
+
+import linkwise as lw
+from helpers.closing_frames import closing_frames
+from linkwise._core import InputError
+from linkwise.scenes import benchmark
+
+NAMES = ("pendulum", "four_bars", "andrews", "bricard", "slider_crank", "stewart")
+WITH_LOOPS = NAMES[1:]
+
+
+def held(model, q):
+    """What each loop joint holds together: points, and directions of axes, on its two links."""
+    frames = closing_frames(model, q)
+    rows = [frames[:, :, :3, 3]]
+    for loop, axes in enumerate(model.loop_axes):
+        for _, axis in axes:
+            rows.append(frames[loop : loop + 1, :, :3, :3] @ np.array(axis))
+    return np.concatenate(rows)
+
+
+@pytest.mark.parametrize("name", WITH_LOOPS)
+def test_loops_are_closed_where_it_starts(name):
+    found = benchmark(name)
+    here, there = held(found.model, found.q0).swapaxes(0, 1)
+    np.testing.assert_allclose(here, there, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["four_bars", "slider_crank"])
+def test_loops_stay_closed_to_first_order(name):
+    found, step = benchmark(name), 1e-7
+    assert found.v0.any()
+    ahead, behind = (held(found.model, found.q0 + s * found.v0) for s in (step, -step))
+    parting = np.diff((ahead - behind) / (2 * step), axis=1)
+    # Central differences: the error is rounding over the step, and the square of the step.
+    np.testing.assert_allclose(parting, 0, atol=1e-8 * max(1.0, np.abs(found.v0).max()))
+
+
+@pytest.mark.parametrize(
+    ("name", "joints", "loops", "mass"),
+    [
+        ("pendulum", 1, 0, 1.0),
+        ("four_bars", 5, 2, 5.0),
+        ("andrews", 7, 3, 0.21023),
+        ("bricard", 5, 1, 5.0),
+        ("slider_crank", 3, 1, 0.586656),
+        ("stewart", 13, 5, 148.0),
+    ],
+)
+def test_sizes_and_masses(name, joints, loops, mass):
+    model = benchmark(name).model
+    assert (model.n_joints, model.n_loops) == (joints, loops)
+    assert model.total_mass == pytest.approx(mass, rel=1e-9)
+
+
+def test_four_bars_in_any_number():
+    found = benchmark("four_bars", n=40)
+    assert (found.model.nv, found.model.n_loops) == (81, 40)
+    tips = np.array(
+        [lw.link_poses(found.model, found.q0)[found.model.link_names.index(f"rod_{k}")]
+         for k in range(41)]
+    ) @ [0, 1, 0, 1]  # fmt: skip
+    np.testing.assert_array_equal(tips[:, :2], [[k, 1] for k in range(41)])
+
+
+def test_the_four_bar_moves_to_the_right_at_one_metre_per_second():
+    found = benchmark("four_bars")
+    step = 1e-6
+    tip = [
+        lw.link_poses(found.model, found.q0 + s * found.v0)[
+            found.model.link_names.index("rod_0")
+        ] @ [0, 1, 0, 1]
+        for s in (step, -step)
+    ]  # fmt: skip
+    np.testing.assert_allclose((tip[0] - tip[1])[:2] / (2 * step), [1, 0], atol=1e-9)
+
+
+def test_kinetic_energy_of_the_four_bars():
+    # Rods turn about their ends at 1 rad/s, bars move at 1 m/s: (n + 1) / 6 + n / 2.
+    found = benchmark("four_bars", n=3)
+    assert lw.kinetic_energy(found.model, found.q0, found.v0) == pytest.approx(4 / 6 + 3 / 2)
+
+
+def test_andrews_mass_matrix():
+    """Entries as the test set for IVP solvers writes them."""
+    found = benchmark("andrews")
+    model, (phi, omega) = found.model, (0.3, -0.7)
+    q = found.q0.copy()
+    q[model.q_slice("Phi")], q[model.q_slice("Omega")] = phi, omega
+
+    def energy(*joints):
+        v = np.zeros(model.nv)
+        for joint in joints:
+            v[model.v_slice(joint)] += 1
+        return lw.kinetic_energy(model, q, v)
+
+    def entry(a, b):
+        return energy(a, b) - energy(a) - energy(b)
+
+    m4, e_ea, zt = 0.00706, 0.02 - 0.01421, 0.04
+    assert entry("Phi", "Phi") == pytest.approx(m4 * e_ea**2 + 5.667e-7, rel=1e-9)
+    cross = m4 * (e_ea**2 + zt * e_ea * np.sin(phi)) + 5.667e-7
+    assert entry("delta", "Phi") == pytest.approx(cross, rel=1e-9)
+    m6, zf_fa, u = 0.00706, 0.02 - 0.01421, 0.04
+    cross = m6 * (zf_fa**2 - u * zf_fa * np.sin(omega)) + 5.667e-7
+    assert entry("epsilon", "Omega") == pytest.approx(cross, rel=1e-9)
+    theta, rr, da = 0.0, 0.007, 0.0115
+    own = 0.04325 * 0.00092**2 + 0.00365 * (rr**2 - 2 * da * rr * np.cos(theta) + da**2)
+    assert entry("beta", "beta") == pytest.approx(own + 2.194e-6 + 4.410e-7, rel=1e-9)
+    assert entry("gamma", "gamma") == pytest.approx(
+        0.02373 * (0.01874**2 + 0.01043**2) + 5.255e-6, rel=1e-9
+    )
+
+
+def test_andrews_spring_is_the_slope_of_its_energy():
+    torque = benchmark("andrews").drives["gamma"]
+    gamma, step = 0.455279819163070380, 1e-6
+
+    def energy(angle):
+        x = 0.02 * np.cos(angle) + 0.018 * np.sin(angle) - 0.03635 - 0.014
+        y = 0.02 * np.sin(angle) - 0.018 * np.cos(angle) + 0.03273 - 0.072
+        return 2265 * (np.hypot(x, y) - 0.07785) ** 2
+
+    slope = (energy(gamma + step) - energy(gamma - step)) / (2 * step)
+    assert torque(0.0, np.array([gamma]), np.zeros(1)) == pytest.approx(-slope, rel=1e-6)
+
+
+def test_bricard_hinges_are_across_both_of_their_rods():
+    found = benchmark("bricard")
+    poses = dict(zip(found.model.link_names, lw.link_poses(found.model, found.q0), strict=True))
+    ends = [poses[f"rod_{i}"][:3, 3] for i in range(5)]
+    np.testing.assert_allclose(
+        ends, [(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1)], atol=1e-15
+    )
+    for (_, axis), rod in zip(
+        [axes[0] for axes in found.model.joint_axes], np.diff([*ends, (0, 0, 1)], axis=0),
+        strict=True,
+    ):  # fmt: skip
+        assert np.dot(axis, rod) == pytest.approx(0, abs=1e-15)
+
+
+def test_unknown_ones_are_named():
+    with pytest.raises(InputError, match="known: pendulum"):
+        benchmark("squeezer")
+    with pytest.raises(InputError, match="n is 0"):
+        benchmark("four_bars", n=0)
