@@ -46,6 +46,8 @@ def inspect(
     screen.print(_joint_table(found["joints"], most))
     if (properties := _property_table(found["joints"], most)) is not None:
         screen.print(properties)
+    if found["loops"]:
+        screen.print(_loop_table(found["loops"], most))
     notes = found["notes"]
     if notes:
         screen.print(_note_table(notes, len(notes) if every_row else _MOST_ROWS))
@@ -85,8 +87,33 @@ def describe_model(model: Model) -> dict[str, Any]:
         "total_mass": model.total_mass,
         "gravity": model.gravity,
         "joints": joints,
+        "loops": _loops(model),
+        "counted_mobility": model.nv - sum(6 - freedom for freedom in model.loop_nv),
         "notes": [{"level": n.level, "element": n.element, "text": n.text} for n in model.notes],
     }
+
+
+def _loops(model: Model) -> list[dict[str, Any]]:
+    """The joints that close loops."""
+    return [
+        {
+            "joint": name,
+            "type": kind,
+            "axes": [{"kind": kind_of_axis, "axis": axis} for kind_of_axis, axis in axes],
+            "parent": parent,
+            "child": child,
+            "degrees_of_freedom": freedom,
+        }
+        for name, kind, axes, parent, child, freedom in zip(
+            model.loop_names,
+            model.loop_types,
+            model.loop_axes,
+            model.loop_parent_link_names,
+            model.loop_child_link_names,
+            model.loop_nv,
+            strict=True,
+        )
+    ]
 
 
 def _plural(count: int, noun: str, nouns: str = "") -> str:
@@ -103,7 +130,19 @@ def _headline(found: dict[str, Any]) -> str:
     return (
         f"{text(found['model'])}{source}: {links} in {bodies}, "
         f"{freedom} ({_plural(found['nq'], 'coordinate')}), {number(found['total_mass'], 6)} kg, "
-        f"gravity ({gravity}) m/s2"
+        f"gravity ({gravity}) m/s2{_said_of_loops(found)}"
+    )
+
+
+def _said_of_loops(found: dict[str, Any]) -> str:
+    """What counting says, as if no two joints held the same."""
+    if not found["loops"]:
+        return ""
+    joints = _plural(len(found["loops"]), "joint closes a loop", "joints close loops")
+    taken = sum(6 - loop["degrees_of_freedom"] for loop in found["loops"])
+    return (
+        f"; {joints}: {found['nv']} - {taken} = {found['counted_mobility']} degrees of freedom "
+        "by counting"
     )
 
 
@@ -151,6 +190,17 @@ def _joint_table(joints: Sequence[dict[str, Any]], most: int) -> Any:
             text(joint["body"]),
             number(joint["mass"]),
         )
+    return made
+
+
+def _loop_table(loops: Sequence[dict[str, Any]], most: int) -> Any:
+    title = "Joints that close loops"
+    if len(loops) > most:
+        title += f" (the first {most} of {len(loops)}; --all shows all)"
+    made = table(title, [(name, "left") for name in ("joint", "type", "axis", "parent", "child")])
+    for loop in loops[:most]:
+        ends = (text(loop["parent"]), text(loop["child"]))
+        made.add_row(text(loop["joint"]), loop["type"], _axes_cell(loop), *ends)
     return made
 
 

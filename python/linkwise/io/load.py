@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from linkwise._core import InputError, Model, as_floats
 from linkwise.io.complaint import complain, shorten
+from linkwise.io.mjcf_equalities import Equality
 from linkwise.io.urdf import JointOrder, Mimic, read_urdf
 from linkwise.io.xml import local_name, parse_xml
 from linkwise.notes import tell, warnings_of
@@ -34,13 +35,14 @@ def load(
     joint_order: JointOrder = "file",
     keep_fixed: bool = False,
     mimic: Mimic = "error",
+    equality: Equality = "ignore",
 ) -> Model:
     """Read a URDF or MJCF file into a Model.
 
     path: the file, or the XML itself as a text that starts with ``<`` (what xacro returns); its
         root element, not its suffix, tells the format.
     floating_base: give the root link of a URDF six degrees of freedom instead of welding it to the
-        ground (an MJCF says this itself, with a free joint).
+        ground (an MJCF file says this itself, with a free joint).
     gravity: m/s2 in the world frame; by default (0, 0, -9.81) for a URDF and the file's own for an
         MJCF.
     package_dirs: directories in which packages of ``package://`` paths may lie; only existence is
@@ -49,8 +51,10 @@ def load(
         the joints of one link by name, so that q, v and tau can be handed over as they are.
     keep_fixed: keep fixed joints that carry mass as joints with a load instead of merging
         their links.
-    mimic: a URDF's mimic joints are refused ("error"), for couplings are not supported, or they
-        move "independent" of each other, with a warning note.
+    mimic: a URDF's mimic joints are refused ("error"), for couplings are not supported, or
+        they move "independent" of each other, with a warning note.
+    equality: an MJCF's connect and weld constraints are left out with a warning ("ignore"), or are
+        spherical and fixed joints that close loops ("exact").
 
     Raises InputError, in one line that names file, line, element and remedy, for anything that
     cannot be read without guessing. What was ignored or assumed is in ``model.notes``; each note
@@ -59,6 +63,7 @@ def load(
     """
     _check_choice(path, "joint_order", joint_order, get_args(JointOrder))
     _check_choice(path, "mimic", mimic, get_args(Mimic))
+    _check_choice(path, "equality", equality, get_args(Equality))
     for directory in package_dirs:
         if not Path(directory).is_dir():
             complain(
@@ -96,14 +101,8 @@ def load(
         if xml is None:
             require_utf8(path)
         check_mjcf(path, root)
-        if floating_base:
-            complain(
-                path,
-                "floating_base",
-                "an MJCF file says itself which bodies float",
-                "leave it out, and give the root body a <freejoint/>",
-            )
-        model = read_mjcf(path, gravity=vector, keep_fixed=keep_fixed, xml=xml)
+        _check_floats(path, floating_base, "give the root body of an MJCF a <freejoint/>")
+        model = read_mjcf(path, gravity=vector, keep_fixed=keep_fixed, equality=equality, xml=xml)
         tell(warnings_of(model), reading=True)
         return model
     complain(
@@ -113,6 +112,12 @@ def load(
         "give a file whose root element is <robot> or <mujoco>",
         root.sourceline,
     )
+
+
+def _check_floats(path: str | os.PathLike[str], floating_base: bool, instead: str) -> None:
+    if floating_base:
+        problem = "the file says itself which bodies float"
+        complain(path, "floating_base", problem, f"leave it out: {instead}")
 
 
 def _check_choice(

@@ -19,6 +19,7 @@ import numpy as np
 from linkwise._core import InputError, Model, ModelBuilder
 from linkwise.base import Array
 from linkwise.io.complaint import complain, file_name, shorten
+from linkwise.io.mjcf_equalities import Equalities, Equality
 from linkwise.io.mjcf_transmissions import Transmissions, without_warnings
 
 KINDS = ("floating", "spherical", "prismatic", "revolute")
@@ -30,14 +31,17 @@ def read_mjcf(
     *,
     gravity: tuple[float, float, float] | None = None,
     keep_fixed: bool = False,
+    equality: Equality = "ignore",
     xml: str | None = None,
 ) -> Model:
     """The model that an MJCF file describes.
 
-    gravity: m/s2; None takes the file's. xml: the text, where it is no file. Raises InputError with
-    MuJoCo's own words for what its compiler refuses, and when the optional package is missing.
-    Contacts, tendons, equality constraints, forces of actuators and what else is not taken over are
-    warnings in ``model.notes``.
+    gravity: m/s2; None takes the file's. equality: whether connect and weld constraints are joints
+    that close loops ("exact") or left out ("ignore"). xml: the text, where it is no file.
+
+    Raises InputError with MuJoCo's own words for what its compiler refuses, and when the optional
+    package is missing. Contacts, tendons, other equality constraints, forces of actuators and what
+    else is not taken over are warnings in ``model.notes``.
     """
     mj_model = compile_mjcf(path, xml)
     names = Names(mj_model)
@@ -47,9 +51,16 @@ def read_mjcf(
     builder = ModelBuilder(stem, gravity=gravity, source=file_name(path))
     try:
         added = Transmissions(mj_model)
+        notes = [*_ignored(mj_model), *added.notes(), *_joint_notes(mj_model, names)]
         with np.errstate(all="ignore"):  # the builder refuses what is no number, with its name
             _add_bodies(builder, mj_model, names, added)
-        notes = [*_ignored(mj_model), *added.notes(), *_joint_notes(mj_model, names)]
+            if equality == "exact":
+                closing = Equalities(mj_model, rotation, set(names.joint))
+                _add_loops(builder, mj_model, names, closing)
+                notes += closing.notes()
+            elif mj_model.neq:
+                text = f"{mj_model.neq} equality constraints ignored: loops stay open"
+                notes.append(("warning", "equality", text))
         for level, element, text in notes:
             builder.add_note(level, element, text)
         return builder.build(keep_fixed=keep_fixed)
@@ -189,6 +200,21 @@ def _add_bodies(builder: ModelBuilder, mj_model: Any, names: Names, added: Trans
             placed = {"rotation": np.eye(3), "translation": np.zeros(3)}
 
 
+def _add_loops(builder: ModelBuilder, mj_model: Any, names: Names, closing: Equalities) -> None:
+    for closure in closing.closures:
+        parent, child = closure.bodies
+        builder.add_loop(
+            closure.name,
+            closure.type,
+            names.body[parent],
+            names.body[child],
+            translation=closure.translation - _anchor(mj_model, parent),
+            rotation=closure.rotation,
+            child_translation=closure.child_translation - _anchor(mj_model, child),
+            child_rotation=closure.child_rotation,
+        )
+
+
 def _enabled(mj_model: Any, flag: str) -> bool:
     import mujoco
 
@@ -243,7 +269,6 @@ def _ignored(mj_model: Any) -> Iterator[tuple[str, str, str]]:
     )
     counts = {
         "contact": (colliding + mj_model.npair, "geoms that can touch: contacts are ignored"),
-        "equality": (mj_model.neq, "equality constraints ignored: loops stay open"),
         "tendon": (
             mj_model.ntendon,
             "tendons: only what is fixed to one joint counts",

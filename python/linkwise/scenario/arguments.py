@@ -18,11 +18,13 @@ from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.mjcf_state import read_keyframe
 from linkwise.io.table import CsvTable, read_table
 from linkwise.io.units import check_dimension
+from linkwise.io.urdf_elements import placement
 from linkwise.loads.rating import Rating
 from linkwise.record.labels import joint_scalars
 from linkwise.record.schema import QUANTITIES
 from linkwise.scenario.schema import (
     FreeSection,
+    JointSection,
     LinkSection,
     LockedSection,
     MotionSection,
@@ -95,26 +97,37 @@ class ArgumentBuilder:
         self.source = source
         self.model = model
         self.joint_names = {name: index for index, name in enumerate(model.joint_names)}
+        self.loop_names = {name: index for index, name in enumerate(model.loop_names)}
         self.tables: dict[Path, CsvTable] = {}
 
     def joint_properties(self) -> dict[str, dict[str, npt.NDArray[np.float64]]]:
         """By joint the properties that the scenario gives it."""
-        result: dict[str, dict[str, npt.NDArray[np.float64]]] = {}
-        for joint, section in self.source.settings.joint.items():
-            keys = ("joint", joint)
+        settings = self.source.settings
+        for loop in settings.loop.keys() & settings.joint.keys():
+            self.source.complain(("joint", loop), "is a loop as well", f"use loop.{loop} alone")
+        given = [(("joint", name), section) for name, section in settings.joint.items()]
+        given += [(("loop", name), section) for name, section in settings.loop.items()]
+        return {keys[1]: self._properties(section, keys) for keys, section in given}
+
+    def _properties(
+        self, section: JointSection, keys: tuple[str, str]
+    ) -> dict[str, npt.NDArray[np.float64]]:
+        joint = keys[1]
+        if joint in self.loop_names:
+            _, rates = self.model.loop_labels(self.loop_names[joint])
+            units = [unit for _, unit in rates]
+        else:
             units = self._units(joint, keys, positions=False)
-            given = {name: getattr(section, name) for name in _PROPERTIES}
-            result[joint] = {
-                name: self._fit(
-                    value if isinstance(value, list) else [value] * len(units),
-                    units,
-                    (*keys, name),
-                    _PROPERTIES[name],
-                )
-                for name, value in given.items()
-                if value is not None
-            }
-        return result
+        return {
+            name: self._fit(
+                value if isinstance(value, list) else [value] * len(units),
+                units,
+                (*keys, name),
+                kinds,
+            )
+            for name, kinds in _PROPERTIES.items()
+            if (value := getattr(section, name)) is not None
+        }
 
     # -- state and output -------------------------------------------------------------------
 
@@ -379,6 +392,12 @@ class ArgumentBuilder:
                 if "merged" in str(error):  # a fixed joint of the file
                     problem, _, remedy = str(error).partition("; ")
                     self.source.complain(keys, problem, remedy)
+            if joint in self.loop_names:
+                self.source.complain(
+                    keys,
+                    f"joint '{shorten(joint)}' closes a loop: it moves as the others do",
+                    "name a joint of the tree",
+                )
             remedy = near(joint, self.joint_names, "the joints are")
             self.source.complain(keys, f"the model has no joint '{shorten(joint)}'", remedy)
         return self.joint_names[joint]
@@ -439,14 +458,42 @@ def with_inertias(source: ScenarioSource, model: Model) -> Model:
     return model
 
 
+def with_loops(source: ScenarioSource, model: Model) -> Model:
+    """The model with the joints that close loops in the scenario."""
+    for name, loop in source.settings.loop.items():
+        keys = ("loop", name)
+        for end in ("parent", "child"):
+            _check_link(source, model, getattr(loop, end), (*keys, end))
+        none = [0.0, 0.0, 0.0]
+        try:
+            model = model.with_loop(
+                name,
+                loop.type,
+                loop.parent,
+                loop.child,
+                translation=loop.translation,
+                rotation=placement(none, loop.rotation or none)[:3, :3],
+                child_translation=loop.child_translation,
+                child_rotation=placement(none, loop.child_rotation or none)[:3, :3],
+                axis=loop.axis,
+                axes=loop.axes,
+                pitch=loop.pitch or 0.0,
+            )
+        except InputError as error:
+            problem, _, remedy = str(error).partition("; ")
+            source.complain(keys, problem, remedy or "correct it")
+    return model
+
+
 def with_properties(source: ScenarioSource, model: Model) -> Model:
     """The model with the joint properties that the scenario changes."""
     for joint, properties in ArgumentBuilder(source, model).joint_properties().items():
         try:
-            model = model.with_joint(joint, **properties)
+            model = model.with_joint(joint, **properties) if properties else model
         except InputError as error:
             problem, _, remedy = str(error).partition("; ")
-            source.complain(("joint", joint), problem, remedy)
+            table = "loop" if joint in source.settings.loop else "joint"
+            source.complain((table, joint), problem, remedy)
     return model
 
 

@@ -25,10 +25,20 @@ from linkwise.scenario.arguments import (
     ScenarioSource,
     key_path,
     with_inertias,
+    with_loops,
     with_properties,
 )
 from linkwise.scenario.schema import RatingsFile, ScenarioFile, describe, keys_at
 
+#: Keys that say how a model file is loaded.
+_OF_MODEL_FILES = (
+    "floating_base",
+    "joint_order",
+    "keep_fixed",
+    "mimic",
+    "equality",
+    "package_dirs",
+)
 # tomllib takes time quadratic in the parts of a dotted key: minutes for a file of 100 kB.
 _PART = r"""(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')"""
 _LONG_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*{_PART}(?:[ \t]*\.[ \t]*{_PART}){{16}}")
@@ -50,7 +60,7 @@ class Scenario(ScenarioSource):
         """
         with quiet():  # the scenario may cure what is wrong in the model's file
             bare = self._bare_model()
-        model = with_properties(self, with_inertias(self, bare))
+        model = with_properties(self, with_inertias(self, with_loops(self, bare)))
         tell(warnings_of(model), reading=True)
         return model
 
@@ -69,8 +79,9 @@ class Scenario(ScenarioSource):
                 joint_order=settings.joint_order,
                 keep_fixed=settings.keep_fixed,
                 mimic=settings.mimic,
+                equality=settings.equality,
             )
-        for name in ("floating_base", "joint_order", "keep_fixed", "mimic", "package_dirs"):
+        for name in _OF_MODEL_FILES:
             if name in settings.model_fields_set:
                 self.complain((name,), "belongs to a model file", "remove it")
         kind = next(k for k in ("chain", "tree", "srms") if getattr(source, k) is not None)

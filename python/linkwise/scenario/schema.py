@@ -289,6 +289,49 @@ class JointSection(Section):
     limit_damping: Vector | None = None
 
 
+Direction = Annotated[list[Number], Field(min_length=3, max_length=3)]
+
+
+class LoopSection(JointSection):
+    """A joint that closes a loop between two links, with its point and axes on both of them.
+
+    rotation: roll, pitch, yaw of the joint's frame against the link's.
+    """
+
+    type: Literal[
+        "fixed",
+        "revolute",
+        "continuous",
+        "prismatic",
+        "helical",
+        "cylindrical",
+        "universal",
+        "spherical",
+        "planar",
+        "floating",
+    ]
+    parent: str
+    child: str
+    translation: Point | None = None
+    rotation: Angles | None = None
+    child_translation: Point | None = None
+    child_rotation: Angles | None = None
+    axis: Direction | None = None
+    axes: Annotated[list[Direction], Field(min_length=2, max_length=2)] | None = None
+    pitch: Annotated[float, _of("length per angle")] | None = None
+
+    @model_validator(mode="after")
+    def _fits(self) -> LoopSection:
+        for name, types in (("pitch", ("helical",)), ("axes", ("universal",))):
+            if getattr(self, name) is not None and self.type not in types:
+                raise ValueError(f"{name} belongs to a {types[0]} joint; remove it")
+            if getattr(self, name) is None and self.type in types:
+                raise ValueError(f"a {self.type} joint needs {name}; add {name} = ...")
+        if self.axis is not None and self.type in ("fixed", "universal", "spherical", "floating"):
+            raise ValueError(f"axis has no meaning for a {self.type} joint; remove it")
+        return self
+
+
 Force = Annotated[float, _of("force"), Field(gt=0)]
 Moment = Annotated[float, _of("moment"), Field(gt=0)]
 
@@ -353,6 +396,7 @@ class ScenarioFile(Section):
     joint_order: Literal["file", "pinocchio"] = "file"
     keep_fixed: bool = False
     mimic: Literal["error", "independent"] = "error"
+    equality: Literal["ignore", "exact"] = "ignore"
     package_dirs: list[str] = []
     initial: InitialSection = InitialSection()
     drive: dict[str, DriveSection] = {}
@@ -360,6 +404,7 @@ class ScenarioFile(Section):
     payload: dict[str, PayloadSection] = {}
     link: dict[str, LinkSection] = {}
     joint: dict[str, JointSection] = {}
+    loop: dict[str, LoopSection] = {}
     rating: dict[str, RatingSection] = {}
     simulate: SimulateSection
     output: OutputSection = OutputSection()
@@ -385,6 +430,7 @@ _NAMED: dict[str, type[Section]] = {
     "payload": PayloadSection,
     "link": LinkSection,
     "joint": JointSection,
+    "loop": LoopSection,
     "rating": RatingSection,
 }
 
@@ -426,7 +472,9 @@ def describe(error: dict[str, Any]) -> tuple[tuple[str, ...], str, str]:
     if kind == "less_than":
         return path, f"is {shown}", f"give a number below {context['lt']}"
     if kind in ("too_short", "too_long"):
-        return path, f"has {context['actual_length']} numbers", "give three"
+        what = "axes" if path[-1] == "axes" else "numbers"
+        count = "two" if what == "axes" else "three"
+        return path, f"has {context['actual_length']} {what}", f"give {count}"
     wanted = {
         "string_type": "a text in quotes",
         "bool_type": "true or false",

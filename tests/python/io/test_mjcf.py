@@ -313,7 +313,7 @@ def test_replicated_bodies_within_bounds_are_read(write):
 
 def test_floating_base_is_the_files_business(write, complaint):
     message = complaint(lw.load, write(MACHINE), floating_base=True)
-    assert message.startswith(": floating_base: an MJCF file says itself which bodies float; ")
+    assert message.startswith(": floating_base: the file says itself which bodies float; ")
 
 
 def test_missing_extra_is_one_line(write, complaint, monkeypatch):

@@ -1,0 +1,144 @@
+"""<connect> and <weld> of an MJCF as joints that close loops, against MuJoCo's own residuals."""
+
+import numpy as np
+import pytest
+
+import linkwise as lw
+from helpers.closing_frames import closing_frames
+from linkwise.io.mjcf_state import position_from_mujoco
+
+mujoco = pytest.importorskip("mujoco")
+
+MACHINE = """<mujoco><worldbody>
+  <body name="a" pos="0.1 0.2 0.3" euler="20 30 40">
+    <joint name="a1" type="ball" pos="0.01 0.02 0.03"/><geom size="0.1"/>
+    <site name="sa" pos="0.2 0.1 -0.1" euler="10 50 -20"/>
+    <body name="b" pos="0.3 0 0.1" euler="0 70 0">
+      <joint name="b1" axis="1 2 3" pos="-0.05 0.02 0"/><joint name="b2" type="slide" axis="0 1 1"/>
+      <geom size="0.1"/>
+    </body>
+  </body>
+  <body name="c" pos="-0.2 0.1 0.2" euler="-30 10 0">
+    <freejoint name="c1"/><geom size="0.1"/><site name="sc" pos="0 0.1 0.2" euler="0 -40 15"/>
+  </body>
+</worldbody><equality>%s</equality></mujoco>"""
+
+CONNECTS = {
+    "bodies": '<connect name="e" body1="b" body2="c" anchor="0.1 -0.2 0.05"/>',
+    "world": '<connect name="e" body1="b" anchor="0.1 -0.2 0.05"/>',
+    "sites": '<connect name="e" site1="sa" site2="sc"/>',
+}
+WELDS = {
+    "bodies": '<weld name="e" body1="b" body2="c" anchor="0.1 0.2 0.3"/>',
+    "relpose": '<weld name="e" body1="b" body2="c" relpose="0.1 0.2 0.3 0.5 0.5 -0.5 0.5" '
+    'anchor="-0.1 0.05 0"/>',
+    "world": '<weld name="e" body1="c"/>',
+    "sites": '<weld name="e" site1="sa" site2="sc"/>',
+}
+
+
+def random_pose(mj_model, seed):
+    """A configuration, and MuJoCo's residuals there."""
+    data = mujoco.MjData(mj_model)
+    rng = np.random.default_rng(seed)
+    mujoco.mj_integratePos(mj_model, data.qpos, rng.normal(size=mj_model.nv), 1.0)
+    mujoco.mj_forward(mj_model, data)
+    return data.qpos.copy(), data.efc_pos[: data.ne].copy()
+
+
+def both(equality, seed=0):
+    text = MACHINE % equality
+    mj_model = mujoco.MjModel.from_xml_string(text)
+    model = lw.load(text, equality="exact")
+    qpos, residual = random_pose(mj_model, seed)
+    frames = closing_frames(model, position_from_mujoco(model, mj_model, qpos))
+    return model, frames[0], residual
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", CONNECTS)
+def test_connect_is_as_far_apart_as_in_mujoco(kind, seed):
+    model, (here, there), residual = both(CONNECTS[kind], seed)
+    assert (model.loop_names, model.loop_types) == (["e"], ["spherical"])
+    assert np.linalg.norm(residual) > 0.05
+    np.testing.assert_allclose(here[:3, 3] - there[:3, 3], residual, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", WELDS)
+def test_weld_is_as_far_apart_as_in_mujoco(kind, seed):
+    model, (here, there), residual = both(WELDS[kind], seed)
+    assert (model.loop_names, model.loop_types) == (["e"], ["fixed"])
+    np.testing.assert_allclose(here[:3, 3] - there[:3, 3], residual[:3], atol=1e-12)
+    # Its rotational residual is the vector part of the quaternion between the two: sin(angle / 2).
+    between = here[:3, :3].T @ there[:3, :3]
+    angle = np.arccos((np.trace(between) - 1) / 2)
+    assert np.linalg.norm(residual[3:]) == pytest.approx(abs(np.sin(angle / 2)), abs=1e-10)
+
+
+def notes_of(text, **options):
+    with pytest.warns(lw.ModelWarning):
+        model = lw.load(text, **options)
+    return model, [note.text for note in model.notes if note.element == "equality"]
+
+
+def test_left_out_unless_asked_for():
+    model, notes = notes_of(MACHINE % CONNECTS["bodies"])
+    assert model.n_loops == 0
+    assert notes == ["1 equality constraints ignored: loops stay open"]
+
+
+@pytest.mark.parametrize(
+    ("equality", "reason"),
+    [
+        ('<joint joint1="b1" joint2="b2"/>', "they couple joints, tendons or flexes"),
+        ('<connect body1="b" anchor="0 0 0" active="false"/>', "not active"),
+    ],
+)
+def test_others_are_named(equality, reason):
+    model, notes = notes_of(MACHINE % equality, equality="exact")
+    assert model.n_loops == 0
+    assert notes == [f"1 equality constraints ignored: {reason}"]
+
+
+def test_switched_off_by_the_file():
+    text = (MACHINE % CONNECTS["bodies"]).replace(
+        "<worldbody>", '<option><flag equality="disable"/></option><worldbody>'
+    )
+    assert notes_of(text, equality="exact")[1] == [
+        "1 equality constraints ignored: the file switches them off"
+    ]
+
+
+def test_mocap_bodies_hold_nothing():
+    text = (MACHINE % '<weld body1="m" body2="c"/>').replace(
+        "<worldbody>", '<worldbody><body name="m" mocap="true"/>'
+    )
+    model, notes = notes_of(text, equality="exact")
+    assert model.n_loops == 0
+    assert "they hold a mocap body, which a program moves" in notes[0]
+
+
+def test_bodies_that_are_one_are_left_out():
+    text = (MACHINE % '<weld body1="a" body2="d"/>').replace(
+        "</body>\n  <body name=\"c\"", '<body name="d" pos="0 0 1"/></body>\n  <body name="c"'
+    )  # fmt: skip
+    assert "both of their bodies are one" in notes_of(text, equality="exact")[1][0]
+
+
+def test_says_that_it_is_exact():
+    model = lw.load(MACHINE % CONNECTS["bodies"], equality="exact")
+    texts = [note.text for note in model.notes if note.element == "e"]
+    assert "<connect> is made exact: a spherical joint without give" in texts
+
+
+def test_names_are_unique():
+    model = lw.load(MACHINE % CONNECTS["bodies"].replace('"e"', '"b1"'), equality="exact")
+    assert model.loop_names == ["b1_"]
+
+
+def test_in_a_scenario(tmp_path):
+    (tmp_path / "m.xml").write_text(MACHINE % CONNECTS["bodies"])
+    path = tmp_path / "s.toml"
+    path.write_text('model = "m.xml"\nequality = "exact"\n[simulate]\nduration = 1\n')
+    assert lw.load_scenario(path).load_model().n_loops == 1

@@ -1,0 +1,145 @@
+"""[loop.NAME] of a scenario closes a loop in any model; what is wrong with it is one line."""
+
+import numpy as np
+import pytest
+
+import linkwise as lw
+from linkwise.scenario import load_scenario
+
+RUN = 'model = "arm.urdf"\n[simulate]\nduration = 1\n'
+LOOP = """[loop.brace]
+type = "revolute"
+parent = "base"
+child = "lower"
+translation = ["100 mm", 0, 0.2]
+rotation = ["90 deg", 0, 0]
+child_translation = [0, 0, -0.1]
+axis = [0, 1, 0]
+"""
+
+
+@pytest.fixture
+def write(arm):
+    def call(text):
+        path = arm.with_name("run.toml")
+        path.write_text(RUN + text)
+        return path
+
+    return call
+
+
+def load(path):
+    return load_scenario(path).load_model()
+
+
+def test_a_loop_with_its_places(write):
+    model = load(write(LOOP + 'damping = "0.5 Nms/rad"\n'))
+    assert model.loop_names == ["brace"]
+    assert model.loop_types == ["revolute"]
+    assert model.loop_nv == [1]
+    assert model.loop_parent_link_names == ["base"]
+    assert model.loop_child_link_names == ["lower"]
+    assert model.loop_axes == [[("revolute", (0.0, 1.0, 0.0))]]
+    here, there = model.loop_placements[0]
+    np.testing.assert_allclose(here[:3, 3], [0.1, 0, 0.2], atol=1e-15)
+    np.testing.assert_allclose(here[:3, :3], [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15)
+    np.testing.assert_array_equal(there[:3, 3], [0, 0, -0.1])
+    assert any(note.element == "brace" and "closes a loop" in note.text for note in model.notes)
+
+
+def test_every_type_of_joint(write):
+    for kind, nv in {
+        "fixed": 0,
+        "revolute": 1,
+        "continuous": 1,
+        "prismatic": 1,
+        "helical": 1,
+        "cylindrical": 2,
+        "universal": 2,
+        "spherical": 3,
+        "planar": 3,
+        "floating": 6,
+    }.items():
+        text = f'[loop.x]\ntype = "{kind}"\nparent = "base"\nchild = "lower"\n'
+        if kind == "helical":
+            text += 'pitch = "5 mm/rev"\n'
+        if kind == "universal":
+            text += "axes = [[1, 0, 0], [0, 1, 0]]\n"
+        assert load(write(text)).loop_nv == [nv]
+
+
+def test_on_a_generated_machine(tmp_path):
+    path = tmp_path / "run.toml"
+    path.write_text(
+        "[model.chain]\nn_bodies = 3\n[simulate]\nduration = 1\n"
+        '[loop.back]\ntype = "spherical"\nparent = "ground"\nchild = "link_3"\n'
+    )
+    assert load(path).n_loops == 1
+
+
+def test_properties_of_a_loop_joint_of_the_file(arm, write):
+    arm.write_text(
+        arm.read_text().replace(
+            "</robot>",
+            '<joint name="brace" type="revolute"><parent link="base"/><child link="lower"/>'
+            "</joint></robot>",
+        )
+    )
+    plain = load(write(""))
+    assert plain.loop_names == ["brace"]
+    assert load(write('[joint.brace]\ndamping = "0.5 Nms/rad"\n')).hash != plain.hash
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"lower"', '"lowr"', "loop.brace.child: the model has no link 'lowr'; did you mean"),
+        ('"revolute"', '"hinge"', "loop.brace.type: 'hinge' is not known; use 'fixed',"),
+        ("axis = [0, 1, 0]", "axis = [0, 1]", "loop.brace.axis: has 2 numbers; give three"),
+        ("axis = [0, 1, 0]", "axis = [0, 0, 0]", "loop.brace: "),
+        ('"100 mm"', '"100 deg"', "loop.brace.translation.0: "),
+        ("axis", "axi", "loop.brace.axi: unknown key; did you mean 'axis'?"),
+        ('type = "revolute"\n', "", "loop.brace.type: is missing; add type = ..."),
+        ('"revolute"', '"helical"', "loop.brace: a helical joint needs pitch; add pitch = ..."),
+        ('"revolute"', '"spherical"', "loop.brace: axis has no meaning for a spherical joint; "),
+        ("axis =", "pitch = 1\naxis =", "loop.brace: pitch belongs to a helical joint; remove it"),
+        ("loop.brace", "loop.shoulder", "loop.shoulder: "),
+        ('"lower"', '"base"', "loop.brace: "),
+        ("axis =", 'damping = "1 N"\naxis =', "loop.brace.damping: "),
+    ],
+)
+def test_what_is_wrong_is_one_line(write, complaint, old, new, said):
+    message = complaint(load, write(LOOP.replace(old, new, 1)))
+    assert message.startswith(f": {said}"), message
+
+
+def test_a_drive_cannot_turn_it(write, complaint):
+    path = write(LOOP + '[drive.brace]\nkind = "torque"\nvalue = 1\n')
+    scenario = load_scenario(path)
+    message = complaint(lambda _: scenario.simulate_arguments(scenario.load_model()), path)
+    assert "joint 'brace' closes a loop: it moves as the others do" in message
+
+
+def test_the_command_calls_it_wrong_input(linkwise, write):
+    result = linkwise("inspect", write(LOOP.replace('"lower"', '"lowr"')))
+    assert result.code == 2
+    assert "loop.brace.child" in result.complaint
+
+
+def test_inspect_shows_it(linkwise, write):
+    found = linkwise("inspect", write(LOOP), "--json").json
+    assert found["counted_mobility"] == found["nv"] - 5
+    assert [loop["joint"] for loop in found["loops"]] == ["brace"]
+    shown = linkwise("inspect", write(LOOP)).out
+    assert "Joints that close loops" in shown
+    assert f"1 joint closes a loop: {found['nv']} - 5 = {found['nv'] - 5} degrees" in " ".join(
+        shown.split()
+    )
+
+
+def test_with_loop_refuses_as_the_builder_does(arm):
+    model = lw.load(arm)
+    with pytest.raises(lw.InputError, match="composite"):
+        model.with_loop("x", "composite", "base", "lower", axes=[("revolute", (0, 0, 1))] * 2)
+    with pytest.raises(lw.InputError, match=r"joint 'shoulder'.* the name is used twice"):
+        model.with_loop("shoulder", "fixed", "base", "lower")
