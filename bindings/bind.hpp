@@ -9,6 +9,7 @@ void bind_model(nanobind::module_& m);
 void bind_dynamics(nanobind::module_& m);
 void bind_causes(nanobind::module_& m);
 void bind_indeterminacy(nanobind::module_& m);
+void bind_loop_gaps(nanobind::module_& m);
 void bind_kinematics(nanobind::module_& m);
 void bind_simulation(nanobind::module_& m);
 void bind_batch_simulation(nanobind::module_& m);

@@ -78,6 +78,41 @@ PyModel* with_coupling(const PyModel& self, std::string name, const nb::dict& fa
   return new PyModel(std::move(spec));
 }
 
+void bind_with_loops(ModelClass& c) {
+  c.def("with_loop", &with_loop, "name"_a, "type"_a, "parent"_a, "child"_a, nb::kw_only(),
+        "translation"_a = nb::none(), "rotation"_a = nb::none(), "child_translation"_a = nb::none(),
+        "child_rotation"_a = nb::none(), "axis"_a = nb::none(), "axes"_a = nb::none(),
+        "pitch"_a = 0.0, "properties"_a, nb::rv_policy::take_ownership,
+        R"(The same machine with one more joint, which closes a loop.
+
+Args:
+    name: unique among joints.
+    type, axis, axes, pitch, properties: as in ModelBuilder.add_loop.
+    parent, child: names of links, or the root link for the ground.
+    translation, rotation, child_translation, child_rotation: as in ModelBuilder.add_loop.
+
+Raises:
+    InputError: as ModelBuilder.add_loop and build.)")
+      .def("with_rod", &with_rod, "name"_a, "parent"_a, "child"_a, nb::kw_only(), "length"_a,
+           "point"_a = nb::none(), "child_point"_a = nb::none(), nb::rv_policy::take_ownership,
+           R"(The same machine with a rod without mass, which keeps the distance of two points.
+
+Args:
+    name, parent, child, length, point, child_point: as in ModelBuilder.add_rod.
+
+Raises:
+    InputError: as ModelBuilder.add_rod and build.)")
+      .def("with_coupling", &with_coupling, "name"_a, "factors"_a, nb::kw_only(), "offset"_a = 0.0,
+           nb::rv_policy::take_ownership,
+           R"(The same machine with coordinates of its joints tied together.
+
+Args:
+    name, factors, offset: as in ModelBuilder.add_coupling.
+
+Raises:
+    InputError: as ModelBuilder.add_coupling and build.)");
+}
+
 }  // namespace
 
 void bind_loop_joints(ModelClass& c) {
@@ -130,39 +165,6 @@ void bind_loop_joints(ModelClass& c) {
           "loop"_a,
           "Suffix and unit of the coordinates and the rates of loop joint number `loop`, as "
           "joint_labels.")
-      .def("with_loop", &with_loop, "name"_a, "type"_a, "parent"_a, "child"_a, nb::kw_only(),
-           "translation"_a = nb::none(), "rotation"_a = nb::none(),
-           "child_translation"_a = nb::none(), "child_rotation"_a = nb::none(),
-           "axis"_a = nb::none(), "axes"_a = nb::none(), "pitch"_a = 0.0, "properties"_a,
-           nb::rv_policy::take_ownership,
-           R"(The same machine with one more joint, which closes a loop.
-
-Args:
-    name: unique among joints.
-    type, axis, axes, pitch, properties: as in ModelBuilder.add_loop.
-    parent, child: names of links, or the root link for the ground.
-    translation, rotation, child_translation, child_rotation: as in ModelBuilder.add_loop.
-
-Raises:
-    InputError: as ModelBuilder.add_loop and build.)")
-      .def("with_rod", &with_rod, "name"_a, "parent"_a, "child"_a, nb::kw_only(), "length"_a,
-           "point"_a = nb::none(), "child_point"_a = nb::none(), nb::rv_policy::take_ownership,
-           R"(The same machine with a rod without mass, which keeps the distance of two points.
-
-Args:
-    name, parent, child, length, point, child_point: as in ModelBuilder.add_rod.
-
-Raises:
-    InputError: as ModelBuilder.add_rod and build.)")
-      .def("with_coupling", &with_coupling, "name"_a, "factors"_a, nb::kw_only(), "offset"_a = 0.0,
-           nb::rv_policy::take_ownership,
-           R"(The same machine with coordinates of its joints tied together.
-
-Args:
-    name, factors, offset: as in ModelBuilder.add_coupling.
-
-Raises:
-    InputError: as ModelBuilder.add_coupling and build.)")
       .def_prop_ro(
           "coupling_names",
           [](const PyModel& s) {
@@ -176,6 +178,7 @@ Raises:
                    "Poses (n_loops, 2, 4, 4) [m] of each joint that closes a loop: of its frame in "
                    "its parent link, and of\n"
                    "its frame in its child link. At zero coordinates the two are one.");
+  bind_with_loops(c);
 }
 
 }  // namespace linkwise::bindings

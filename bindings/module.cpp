@@ -36,6 +36,7 @@ Raises:
   linkwise::bindings::bind_builder(m);
   linkwise::bindings::bind_frame(m);
   linkwise::bindings::bind_model(m);
+  linkwise::bindings::bind_loop_gaps(m);
   linkwise::bindings::bind_dynamics(m);
   linkwise::bindings::bind_causes(m);
   linkwise::bindings::bind_indeterminacy(m);

@@ -14,7 +14,8 @@ from linkwise.cli.progress import live_steps
 
 def compare(
     model: Annotated[
-        Path, typer.Argument(metavar="MODEL|SCENARIO", help="Model file (URDF, MJCF) or scenario.")
+        Path,
+        typer.Argument(metavar="MODEL|SCENARIO", help="Model file (URDF, MJCF, SDF) or scenario."),
     ],
     states: Annotated[
         int, typer.Option(min=1, max=10_000, help="Successive states to evaluate at.")

@@ -28,7 +28,7 @@ _ACTING = {
 
 def inspect(
     model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="Model file (URDF, MJCF) or scenario.")
+        Path, typer.Argument(metavar="MODEL", help="Model file (URDF, MJCF, SDF) or scenario.")
     ],
     floating_base: FloatingBase = False,
     package_dir: PackageDirs = None,

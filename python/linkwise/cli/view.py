@@ -19,7 +19,8 @@ def view(
     target: Annotated[
         Path,
         typer.Argument(
-            metavar="RUN|MODEL", help="A run's folder, a model file (URDF, MJCF) or a scenario."
+            metavar="RUN|MODEL",
+            help="A run's folder, a model file (URDF, MJCF, SDF) or a scenario.",
         ),
     ],
     port: Annotated[int, typer.Option("--port", help="Where to serve; 0: any free port.")] = 8080,

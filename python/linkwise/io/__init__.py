@@ -1,4 +1,4 @@
-"""Reading what users bring: models (URDF, MJCF) and CSV tables.
+"""Reading what users bring: models (URDF, MJCF, SDF) and CSV tables.
 
 Everything here treats its input as untrusted: sizes are bounded, XML entities and includes are
 refused, nothing is fetched. A defect is one line that names file, line, element and remedy.

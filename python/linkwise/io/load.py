@@ -37,21 +37,22 @@ def load(
     mimic: Mimic = "error",
     equality: Equality = "ignore",
 ) -> Model:
-    """Read a URDF or MJCF file into a Model.
+    """Read a URDF, MJCF or SDF file into a Model.
 
     path: the file, or the XML itself as a text that starts with ``<`` (what xacro returns); its
         root element, not its suffix, tells the format.
     floating_base: give the root link of a URDF six degrees of freedom instead of welding it to the
-        ground (an MJCF file says this itself, with a free joint).
-    gravity: m/s2 in the world frame; by default (0, 0, -9.81) for a URDF and the file's own for an
-        MJCF.
+        ground (MJCF and SDF say this themselves: with a free joint, and by joining nothing to the
+        world).
+    gravity: m/s2 in the world frame; by default the file's own where it has one (MJCF, worlds of
+        SDF), else (0, 0, -9.81).
     package_dirs: directories in which packages of ``package://`` paths may lie; only existence is
         checked, the dynamics needs no meshes.
     joint_order: "file" keeps the file's order (parents first), "pinocchio" goes depth first with
         the joints of one link by name, so that q, v and tau can be handed over as they are.
     keep_fixed: keep fixed joints that carry mass as joints with a load instead of merging
         their links.
-    mimic: a URDF's mimic joints are refused ("error"), for couplings are not supported, or
+    mimic: mimic joints of URDF and SDF are refused ("error"), for couplings are not supported, or
         they move "independent" of each other, with a warning note.
     equality: an MJCF's connect and weld constraints are left out with a warning ("ignore"), or are
         spherical and fixed joints that close loops ("exact").
@@ -105,11 +106,18 @@ def load(
         model = read_mjcf(path, gravity=vector, keep_fixed=keep_fixed, equality=equality, xml=xml)
         tell(warnings_of(model), reading=True)
         return model
+    if kind == "sdf":
+        from linkwise.io.sdf import read_sdf
+
+        _check_floats(path, floating_base, "what is not joined to the world floats in an SDF")
+        model = read_sdf(path, root, gravity=vector, keep_fixed=keep_fixed, mimic=mimic)
+        tell(warnings_of(model), reading=True)
+        return model
     complain(
         path,
         f"element '{shorten(kind)}'",
-        "is the root of neither a URDF nor an MJCF",
-        "give a file whose root element is <robot> or <mujoco>",
+        "is the root of neither a URDF, an MJCF nor an SDF",
+        "give a file whose root element is <robot>, <mujoco> or <sdf>",
         root.sourceline,
     )
 

@@ -7,7 +7,7 @@ line, element and remedy.
 from __future__ import annotations
 
 import os
-from typing import NoReturn
+from typing import NoReturn, Self
 
 import numpy as np
 from lxml import etree
@@ -54,14 +54,14 @@ class UrdfElement:
                     self._children.setdefault(local_name(child), []).append(child)
         return self._children
 
-    def child(self, tag: str) -> UrdfElement | None:
+    def child(self, tag: str) -> Self | None:
         """The only child of that name, or None."""
-        found = [UrdfElement(self._path, c, self.title) for c in self.children().get(tag, ())]
+        found = [type(self)(self._path, c, self.title) for c in self.children().get(tag, ())]
         if len(found) > 1:
             found[1].fail(f"has two <{tag}> elements", "keep one")
         return found[0] if found else None
 
-    def required(self, tag: str, remedy: str) -> UrdfElement:
+    def required(self, tag: str, remedy: str) -> Self:
         found = self.child(tag)
         if found is None:
             self.fail(f"<{local_name(self._element)}> has no <{tag}>", remedy)

@@ -18,7 +18,7 @@ def diagnose(text: str, message: str, line: int | None) -> tuple[str, str, int |
         if found:
             problem, remedy, where = found
             return f"is not XML ({shorten(problem, 120)})", remedy, where or line
-    return f"is not XML ({shorten(message, 120)})", "give a URDF or MJCF file", line
+    return f"is not XML ({shorten(message, 120)})", "give a URDF, MJCF or SDF file", line
 
 
 _Found = tuple[str, str, "int | None"] | None
@@ -31,7 +31,7 @@ def _line_of(text: str, position: int) -> int:
 def _whole(text: str, message: str, line: int | None) -> _Found:
     start = text.lstrip()[:200].lower()
     if not start:
-        return "no element found: the file is empty", "give a URDF or MJCF file", None
+        return "no element found: the file is empty", "give a URDF, MJCF or SDF file", None
     if start.startswith("version https://git-lfs"):
         return "it is a Git LFS pointer", "fetch the file itself: git lfs pull", None
     if start.startswith(("<!doctype html", "<html")):

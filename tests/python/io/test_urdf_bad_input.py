@@ -318,11 +318,11 @@ def test_entities_are_refused_before_they_are_read(tmp_path, complaint, text, li
         (
             b"",
             ":1: model file: is not XML (no element found: the file is empty); "
-            "give a URDF or MJCF file",
+            "give a URDF, MJCF or SDF file",
         ),
         (
             b"hello",
-            ":1: model file: is not XML (syntax error); give a URDF or MJCF file",
+            ":1: model file: is not XML (syntax error); give a URDF, MJCF or SDF file",
         ),
         (
             b"\x00\x01\x02",
@@ -335,9 +335,9 @@ def test_entities_are_refused_before_they_are_read(tmp_path, complaint, text, li
             "write </link> where it ends",
         ),
         (
-            b"<sdf/>",
-            ":1: element 'sdf': is the root of neither a URDF nor an MJCF; "
-            "give a file whose root element is <robot> or <mujoco>",
+            b"<scene/>",
+            ":1: element 'scene': is the root of neither a URDF, an MJCF nor an SDF; "
+            "give a file whose root element is <robot>, <mujoco> or <sdf>",
         ),
         (
             b'<robot name="r"/>',

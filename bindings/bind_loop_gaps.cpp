@@ -1,0 +1,45 @@
+// How far what loop joints join is apart.
+#include <nanobind/nanobind.h>
+
+#include "bind.hpp"
+#include "linkwise/kinematics/loop_states.hpp"
+#include "states.hpp"
+
+namespace linkwise::bindings {
+
+void bind_loop_gaps(nb::module_& m) {
+  m.def(
+      "loop_gaps",
+      [](const PyModel& self, nb::handle q) {
+        const Model& model = *self.model;
+        const States s(model, q, nb::none(), nb::none(), "tau", nb::none());
+        NewArray out(s.lead, {size(model.n_loops()), 2});
+        without_gil([&](const GoOn& go_on) {
+          LoopStates loops(model);
+          double* gap = out.data;
+          for (size_t i = 0; i < s.count && go_on(); ++i) {
+            SweepInput<double> in;
+            in.q = s.q.data + i * size(model.nq());
+            loops.update(in);
+            for (int l = 0; l < model.n_loops(); ++l, gap += 2) {
+              const LoopMiss miss = miss_of(loops[l], loops[l].gap);
+              gap[0] = miss.shift;
+              gap[1] = miss.turn;
+            }
+          }
+        });
+        return out.array;
+      },
+      "model"_a, "q"_a,
+      R"(How far each joint that closes a loop is from closing it (..., n_loops, 2) [m, rad]: by a
+shift and by a turn, of what the joint holds together. Both are zero where q closes all loops.
+
+Args:
+    model: the mechanism.
+    q: positions (..., nq) [rad, m].
+
+Raises:
+    InputError: q has another shape.)");
+}
+
+}  // namespace linkwise::bindings

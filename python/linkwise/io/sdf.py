@@ -1,0 +1,418 @@
+"""Reading SDF, the format of Gazebo, into a Model.
+
+One model of links and joints is read, strictly as the URDF reader does. A link that is the child of
+several joints closes loops. Its link frame here lies at the joint that it hangs on, because a joint
+load is given at the joint point; a link that hangs on nothing keeps its own and floats.
+
+Facts of the format, versions 1.5 and later (sdformat.org): a joint's pose counts from its child, an
+axis from the joint, and at zero the machine is as drawn; what is not joined to the world is free.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import Counter, deque
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from lxml import etree
+
+from linkwise._core import InputError, Model, ModelBuilder
+from linkwise.base import Array
+from linkwise.io.complaint import complain, file_name, shorten
+from linkwise.io.sdf_frames import MODEL, WORLD, Frames, SdfElement, pose_of, quaternion_of
+from linkwise.io.urdf import Mimic
+from linkwise.io.xml import is_foreign, local_name
+
+#: Joint types of the format, with their names here and how many axes they have.
+JOINT_TYPES = {
+    "fixed": ("fixed", 0),
+    "revolute": ("revolute", 1),
+    "continuous": ("continuous", 1),
+    "prismatic": ("prismatic", 1),
+    "screw": ("helical", 1),
+    "universal": ("universal", 2),
+    "ball": ("spherical", 0),
+}
+_UNLIMITED = 1e16
+_OLDEST = (1, 5)
+#: By element, what is read of it, and what has no part in the dynamics.
+_READ = {
+    "model": "link joint frame pose static",
+    "link": "pose inertial gravity kinematic velocity_decay",
+    "frame": "pose",
+    "joint": "parent child pose axis axis2 screw_thread_pitch thread_pitch gearbox_ratio "
+    "gearbox_reference_body",
+    "inertial": "pose mass inertia",
+    "inertia": "ixx ixy ixz iyy iyz izz",
+    "axis": "xyz limit dynamics mimic use_parent_model_frame",
+    "axis2": "xyz limit dynamics mimic use_parent_model_frame",
+    "limit": "lower upper effort velocity",
+    "dynamics": "damping friction spring_reference spring_stiffness",
+    "mimic": "multiplier offset reference",
+}
+_HARMLESS = {
+    "model": "plugin self_collide allow_auto_disable enable_wind gripper",
+    "link": "visual collision sensor light projector audio_sink audio_source enable_wind "
+    "self_collide must_be_base_link battery particle_emitter plugin",
+    "joint": "physics sensor",
+    "limit": "stiffness dissipation",
+    "inertial": "density",
+}
+
+
+def read_sdf(
+    path: str | os.PathLike[str],
+    root: etree._Element,
+    *,
+    gravity: tuple[float, float, float] | None = None,
+    keep_fixed: bool = False,
+    mimic: Mimic = "error",
+) -> Model:
+    """The model that the parsed SDF ``root`` describes; ``path`` is for messages.
+
+    gravity: m/s2; None takes the file's, or (0, 0, -9.81). keep_fixed, mimic: as in ``load``.
+    Raises InputError, in one line with file, line, element and remedy.
+    """
+    reader = _Reader(path, root, mimic)
+    chosen = gravity or reader.gravity or (0.0, 0.0, -9.81)
+    builder = ModelBuilder(reader.name, gravity=chosen, source=file_name(path))
+    reader.fill(builder)
+    for note in reader.notes():
+        builder.add_note(*note)
+    try:
+        return builder.build(keep_fixed=keep_fixed)
+    except InputError as error:
+        raise reader.with_line(error) from None
+
+
+@dataclass
+class SdfJoint:
+    """A joint of the file, with its frame's pose (4, 4) as drawn."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    pose: Array
+    properties: dict[str, Any]
+
+
+class _Reader:
+    def __init__(self, path: str | os.PathLike[str], root: etree._Element, mimic: Mimic) -> None:
+        self._path, self._mimic = path, mimic
+        self._found: dict[str, SdfElement] = {}
+        self._notes: list[tuple[str, str, str]] = []
+        self._harmless: Counter[str] = Counter()
+        self.gravity: tuple[float, float, float] | None = None
+        self._check_version(root)
+        element = self._only_model(root)
+        self.name = element.get("name") or os.path.splitext(os.path.basename(file_name(path)))[0]
+        model = self._element(element, f"model '{shorten(self.name)}'")
+        if self._switched_on(model, "static"):
+            model.fail("is static, so nothing in it moves", "remove <static>")
+        self._frames = Frames(path, model)
+        self._joints: list[SdfElement] = []
+        for child in element.iterchildren(tag=etree.Element):
+            tag = local_name(child)
+            if tag in ("include", "model"):
+                title = f"element '{tag}'"
+                remedy = "write links and joints into one model (gz sdf -p expands includes)"
+                complain(path, title, "models within models are not read", remedy, child.sourceline)
+            if tag in ("link", "joint", "frame") and not is_foreign(child, root):
+                self._add_named(child, tag)
+        if not self._frames.links:
+            model.fail("has no links", "give a model of links and joints")
+
+    # -- what the file holds --------------------------------------------------------------------
+
+    def _check_version(self, root: etree._Element) -> None:
+        text = root.get("version", "")
+        parts = text.strip().split(".")
+        known = len(parts) == 2 and all(p.isascii() and p.isdigit() and len(p) < 4 for p in parts)
+        version = tuple(int(part) for part in parts) if known else (0, 0)
+        if version < _OLDEST or version[0] > 1:
+            complain(
+                self._path,
+                "sdf",
+                f"version '{shorten(text)}' is not read",
+                "convert it to 1.5 or later (gz sdf -p FILE)",
+                root.sourceline,
+            )
+
+    def _only_model(self, root: etree._Element) -> etree._Element:
+        worlds = [c for c in root.iterchildren(tag=etree.Element) if local_name(c) == "world"]
+        inside = list((worlds[0] if worlds else root).iterchildren(tag=etree.Element))
+        models = [c for c in inside if local_name(c) == "model"]
+        if len(worlds) > 1 or len(models) != 1:
+            count = f"{len(worlds)} worlds" if len(worlds) > 1 else f"{len(models)} models"
+            remedy = "give a file with one <model>; included ones are not fetched"
+            complain(self._path, "sdf", f"holds {count}", remedy, root.sourceline)
+        for child in inside if worlds else ():
+            tag = local_name(child)
+            if tag == "gravity":
+                given = SdfElement(self._path, child, "world").numbers("value", 3, "gravity")
+                self.gravity = (given[0], given[1], given[2])
+            elif tag in ("include", "joint", "frame"):
+                remedy = "write what belongs to the machine into its model"
+                complain(self._path, "world", f"<{tag}> is not read", remedy, child.sourceline)
+        return models[0]
+
+    def _element(self, element: etree._Element, title: str) -> SdfElement:
+        """The element, whose children of unknown names are noted."""
+        tag = local_name(element)
+        read, harmless = _READ[tag].split(), _HARMLESS.get(tag, "").split()
+        for child in element.iterchildren(tag=etree.Element):
+            name = local_name(child)
+            if is_foreign(child, element) or name in harmless:
+                self._harmless[f"<{shorten(name)}> of a {tag}"] += 1
+            elif name not in read and name not in ("include", "model"):
+                text = f"unknown element <{shorten(name)}> in <{tag}> is not read"
+                self._warn(title, f"{text} (line {child.sourceline})")
+            elif name in _READ and name not in ("link", "joint", "frame"):
+                self._element(child, title)
+        return SdfElement(self._path, element, title)
+
+    def _add_named(self, element: etree._Element, tag: str) -> None:
+        name = element.get("name", "")
+        found = self._element(element, f"{tag} '{shorten(name)}'" if name else tag)
+        if not name:
+            found.fail("has no name", 'add name="..."')
+        if name in (WORLD, MODEL) or (name.startswith("__") and name.endswith("__")):
+            found.fail("has a name that the format reserves", "rename it")
+        if self._frames.taken(name):
+            found.fail("the name is used twice", "rename one of them")
+        self._found[f"{tag} '{name}'"] = found
+        if tag == "link":
+            self._frames.links[name] = found
+            self._frames.add(name, found, MODEL, name)
+        elif tag == "frame":
+            attached_to = found.get("attached_to") or MODEL
+            self._frames.add(name, found, attached_to, attached_to)
+        else:
+            child = self._end(found, "child")
+            self._frames.add(name, found, child, child)
+            self._joints.append(found)
+
+    def _end(self, joint: SdfElement, role: str) -> str:
+        end = joint.child(role)
+        text = None if end is None else end.get("value")
+        if text is None:
+            joint.fail(f"has no {role}", f"add <{role}>LINK</{role}>")
+        return text.strip()
+
+    @staticmethod
+    def _switched_on(element: SdfElement, name: str, default: bool = False) -> bool:
+        text = element.get(name)
+        return default if text is None else text.strip().lower() in ("true", "1")
+
+    # -- the model ------------------------------------------------------------------------------
+
+    def fill(self, builder: ModelBuilder) -> None:
+        """Links and joints; each link hangs on the first joint that reaches it from the root."""
+        joints = [self._joint(element) for element in self._joints]
+        hangs_on, roots = self._tree(joints)
+        frames = {WORLD: np.eye(4)}
+        for name, link in self._frames.links.items():
+            own = self._frames.pose(name, link)
+            frames[name] = hangs_on[name].pose if name in hangs_on else own
+            self._add_link(builder, name, link, np.linalg.inv(frames[name]) @ own)
+        builder.add_link(WORLD)
+        names = {joint.name for joint in joints}
+        for name in roots:
+            free = f"{name}_free"
+            while free in names:
+                free += "_"
+            names.add(free)
+            pose = frames[name]
+            start = [*pose[:3, 3], *quaternion_of(pose[:3, :3])]
+            builder.add_joint(free, "floating", WORLD, name, initial=start)
+            text = f"link '{shorten(name)}' is not joined to the world: it floats"
+            self._notes.append(("info", free, text))
+        for joint in joints:
+            at = np.linalg.inv(frames[joint.parent]) @ joint.pose
+            placed = {"rotation": at[:3, :3], "translation": at[:3, 3], **joint.properties}
+            if hangs_on.get(joint.child) is joint:
+                builder.add_joint(joint.name, joint.type, joint.parent, joint.child, **placed)
+                continue
+            there = np.linalg.inv(frames[joint.child]) @ joint.pose
+            builder.add_loop(
+                joint.name,
+                joint.type,
+                joint.parent,
+                joint.child,
+                child_rotation=there[:3, :3],
+                child_translation=there[:3, 3],
+                **placed,
+            )
+
+    def _tree(self, joints: list[SdfJoint]) -> tuple[dict[str, SdfJoint], list[str]]:
+        """By link the joint that it hangs on, breadth first, and the links that hang on none."""
+        outboard: dict[str, list[SdfJoint]] = {}
+        for joint in joints:
+            outboard.setdefault(joint.parent, []).append(joint)
+        children = {joint.child for joint in joints}
+        links = list(self._frames.links)
+        hangs_on: dict[str, SdfJoint] = {}
+        roots: list[str] = []
+        starts = [WORLD, *(n for n in links if n not in children), *links]
+        for start in starts:
+            if start in hangs_on or start in roots:
+                continue
+            if start != WORLD:
+                roots.append(start)
+            waiting = deque([start])
+            while waiting:
+                for joint in outboard.get(waiting.popleft(), ()):
+                    if joint.child not in hangs_on and joint.child not in (*roots, WORLD):
+                        hangs_on[joint.child] = joint
+                        waiting.append(joint.child)
+        return hangs_on, roots
+
+    def _add_link(self, builder: ModelBuilder, name: str, link: SdfElement, own: Array) -> None:
+        """own: pose of the file's link frame in the model's."""
+        for switch, default in (("gravity", True), ("kinematic", False)):
+            if self._switched_on(link, switch, default) != default:
+                self._warn(name, f"<{switch}> is not read: the link falls and moves as the others")
+        if link.child("velocity_decay") is not None:
+            self._warn(name, "<velocity_decay> is not read: no such drag acts")
+        inertial = link.child("inertial")
+        if inertial is None:
+            self._warn(name, "has no <inertial>; 1 kg and 1 kg m2 are taken, as the format says")
+            builder.add_link(name, mass=1.0, com=own[:3, 3], inertia=np.eye(3))
+            return
+        if inertial.get("auto") is not None:
+            inertial.fail("<inertial auto> asks for computed inertia", "write mass and inertia")
+        pose, reference = pose_of(inertial)
+        if reference:
+            inertial.fail("its pose names a frame, which the format does not allow", "leave it out")
+        mass = inertial.number("mass", "mass")
+        moments = inertial.required("inertia", "add <inertia> with ixx, iyy, izz in kg m2")
+        xx, yy, zz = (moments.number(key, f"inertia {key}") for key in ("ixx", "iyy", "izz"))
+        xy, xz, yz = (
+            0.0 if moments.get(key) is None else moments.number(key, f"inertia {key}")
+            for key in ("ixy", "ixz", "iyz")
+        )
+        placed = own @ pose
+        turned = placed[:3, :3]
+        inertia = turned @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turned.T
+        inertia = 0.5 * inertia + 0.5 * inertia.T
+        builder.add_link(name, mass=mass, com=placed[:3, 3], inertia=inertia)
+
+    def _joint(self, element: SdfElement) -> SdfJoint:
+        name, kind = str(element.get("name")), element.get("type")
+        if kind not in JOINT_TYPES:
+            problem = "has no type" if kind is None else f"type '{shorten(kind)}' is not read"
+            element.fail(problem, f"use one of {', '.join(JOINT_TYPES)}")
+        here, n_axes = JOINT_TYPES[kind]
+        ends = [
+            self._frames.link_of(self._end(element, role), element, role)
+            for role in ("parent", "child")
+        ]
+        pose = self._frames.pose(name, element)
+        properties: dict[str, Any] = {}
+        if kind == "screw":
+            properties["pitch"] = self._pitch(element)
+        given = [element.child(tag) for tag in ("axis", "axis2")[:n_axes]]
+        axes = [self._axis(element, axis, pose) for axis in given]
+        if n_axes == 2:
+            properties["axes"] = axes
+        elif axes:
+            properties["axis"] = axes[0]
+        each = [self._properties(name, kind, axis) for axis in given]
+        for key, values in each[0].items() if each else ():
+            every = [values, *(other[key] for other in each[1:])]
+            properties[key] = every if len(every) > 1 else values
+        return SdfJoint(name, here, ends[0], ends[1], pose, properties)
+
+    def _pitch(self, element: SdfElement) -> float:
+        """m/rad of a screw."""
+        if element.get("screw_thread_pitch") is None:
+            element.fail(
+                "has no <screw_thread_pitch>; <thread_pitch> means different things to different "
+                "programs"
+                if element.get("thread_pitch") is not None
+                else "has no <screw_thread_pitch>",
+                "give <screw_thread_pitch> in m per turn, positive for a right-hand thread",
+            )
+        return element.number("screw_thread_pitch", "screw_thread_pitch") / (2 * math.pi)
+
+    def _axis(self, element: SdfElement, axis: SdfElement | None, pose: Array) -> list[float]:
+        """The axis in the joint's frame, of length 1."""
+        if axis is None:
+            element.fail("has no <axis>", "add <axis> with <xyz> (and <axis2> if it has two)")
+        xyz = axis.child("xyz")
+        if xyz is None:
+            return [0.0, 0.0, 1.0]
+        direction = np.array(xyz.numbers("value", 3, "axis"))
+        expressed = xyz.get("expressed_in") or ""
+        if not expressed and self._switched_on(axis, "use_parent_model_frame"):
+            expressed = MODEL
+        if expressed:
+            direction = pose[:3, :3].T @ self._frames.pose(expressed, xyz)[:3, :3] @ direction
+        length = math.hypot(*direction)
+        return [float(x) / length for x in direction] if length > 0 else [0.0, 0.0, 0.0]
+
+    def _properties(self, name: str, kind: str, axis: SdfElement | None) -> dict[str, float]:
+        found = dict.fromkeys(
+            ("damping", "friction", "stiffness", "rest_position", "lower", "upper"), 0.0
+        )
+        found |= {"lower": -math.inf, "upper": math.inf, "effort": math.inf, "velocity": math.inf}
+        if axis is None:
+            return found
+        mimic = axis.child("mimic")
+        if mimic is not None:
+            target = shorten(mimic.get("joint") or "")
+            if self._mimic == "error":
+                axis.fail(
+                    f"mimics joint '{target}', and couplings are not supported",
+                    'let it move on its own with mimic="independent", or remove <mimic>',
+                )
+            self._warn(name, f"mimics joint '{target}': the coupling is ignored")
+        dynamics, limit = axis.child("dynamics"), axis.child("limit")
+        for key, element in (
+            ("damping", "damping"),
+            ("friction", "friction"),
+            ("stiffness", "spring_stiffness"),
+            ("rest_position", "spring_reference"),
+        ):
+            if dynamics is not None and dynamics.get(element) is not None:
+                found[key] = dynamics.number(element, element)
+        if limit is None:
+            return found
+        if kind in ("screw", "continuous"):
+            if limit.get("lower") is not None or limit.get("upper") is not None:
+                self._warn(name, f"the range of a {kind} joint is not read")
+        else:
+            for key, sign in (("lower", -1), ("upper", 1)):
+                value = None if limit.get(key) is None else limit.limit(key, sign)
+                if value is not None and abs(value) < _UNLIMITED:
+                    found[key] = value
+        for key in ("effort", "velocity"):
+            value = None if limit.get(key) is None else limit.limit(key)
+            if value is not None and value >= 0:
+                found[key] = value
+        return found
+
+    # -- notes and complaints -------------------------------------------------------------------
+
+    def _warn(self, element: str, text: str) -> None:
+        name = element.partition(" ")[2].strip("'") if " '" in element else element
+        self._notes.append(("warning", name, text))
+
+    def notes(self) -> list[tuple[str, str, str]]:
+        counted = [
+            ("info", tag, f"{count} ignored: not part of the rigid-body dynamics")
+            for tag, count in sorted(self._harmless.items())
+        ]
+        return [*self._notes, *counted]
+
+    def with_line(self, error: InputError) -> InputError:
+        """The core's complaint, ELEMENT of FILE: PROBLEM; REMEDY, as FILE:LINE: ELEMENT: ..."""
+        element, _, rest = str(error).partition(f" of {file_name(self._path)}")
+        found = self._found.get(element)
+        line = f":{found.line}" if found is not None and found.line else ""
+        text = shorten(f"{element}{rest}", 2000)
+        return InputError(f"{shorten(os.fspath(self._path), 400)}{line}: {text}")
