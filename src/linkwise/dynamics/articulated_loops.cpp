@@ -55,6 +55,29 @@ void require_free_joints(const Model& model) {
     }
 }
 
+/// Of each term the column of its joint's P, or -1 where its motion is given. InputError where all
+/// are given.
+std::vector<int> terms_of(const Model& model, const Coupling& coupling) {
+  std::vector<int> columns;
+  bool any = false;
+  for (const Coupling::Term& term : coupling.terms) {
+    const BodyTopology& body = model.topology[term.body];
+    int column = 0, found = -1;
+    for (int i = 0; i < body.n_elements; ++i) {
+      const Element& e = model.elements[body.first_element + i];
+      if (e.prescribed) continue;
+      if (e.v == term.v) found = column;
+      column += e.nv;
+    }
+    columns.push_back(found);
+    any |= found >= 0;
+  }
+  if (!any)
+    throw InputError("coupling '" + coupling.name + "'" + model.where() +
+                     " ties joints whose motions are all given; leave one of them free");
+  return columns;
+}
+
 Force<double> direction(const Vector6<double>& Q) { return to_force(Q.data()); }
 
 }  // namespace
@@ -62,7 +85,7 @@ Force<double> direction(const Vector6<double>& Q) { return to_force(Q.data()); }
 ArticulatedLoops::ArticulatedLoops(const Model& model)
     : model_(model), sweeps_(model), states_(model), groups_(make_loop_groups(model)) {
   require_free_joints(model);
-  refuse_couplings(model, "method articulated_body");
+  for (const Coupling& coupling : model.couplings) terms_.push_back(terms_of(model, coupling));
   work_.resize(groups_.size());
   for (size_t g = 0; g < groups_.size(); ++g) {
     const size_t rows = groups_[g].rows;
@@ -120,30 +143,58 @@ bool ArticulatedLoops::evaluate(const SweepInput<double>& in, double* du, double
 }
 
 /// Unit forces where they act: on the bodies that the joint joins, or on the top.
-void ArticulatedLoops::place_forces(int g) {
+void ArticulatedLoops::place_forces(const SweepInput<double>& in, int g) {
   Work& w = work_[g];
-  for (auto& column : w.columns) column.F = {};
+  for (auto& column : w.columns) {
+    column.F = {};
+    std::fill_n(column.z, 6, 0.0);
+  }
   std::fill(w.Psi.begin(), w.Psi.end(), Force<double>{});
   for (const auto& member : groups_[g].members) {
+    if (member.coupling >= 0) {
+      place_coupling(in, g, member);
+      continue;
+    }
     const LoopState& loop = states_[member.loop];
     for (int i = 0; i < member.n_rows; ++i) {
       const Force<double> Q = direction(loop.basis.Q[i]);
       const auto add = [&](int at, const Force<double>& wrench) {
         (at >= 0 ? w.columns[at + i].F : w.Psi[-1 - at + i]) += wrench;
       };
-      add(member.on_a, wrench_on_a(loop, Q));
-      add(member.on_b, wrench_on_b(model_.loops.joints[member.loop], Q));
+      add(member.at[0], wrench_on_a(loop, Q));
+      add(member.at[1], wrench_on_b(model_.loops.joints[member.loop], Q));
       w.r[member.row + i] = loop.r[i];
-      w.size[member.row + i] = std::abs(w.r[member.row + i]);
+      w.size[member.row + i] = std::abs(loop.r[i]);
     }
   }
+}
+
+/// A torque in each joint. The row is the sum of factors times accelerations, of which those of
+/// given motions are known.
+void ArticulatedLoops::place_coupling(const SweepInput<double>& in, int g,
+                                      const LoopGroup::Member& member) {
+  Work& w = work_[g];
+  const Coupling& coupling = model_.couplings[member.coupling];
+  double known = 0, size = 0;
+  for (size_t t = 0; t < coupling.terms.size(); ++t) {
+    const Coupling::Term& term = coupling.terms[t];
+    const int k = terms_[member.coupling][t];
+    if (k >= 0) {
+      w.columns[member.at[t]].z[k] += term.factor;
+    } else if (in.prescribed) {
+      known += term.factor * in.prescribed[term.v];
+      size += std::abs(term.factor * in.prescribed[term.v]);
+    }
+  }
+  w.r[member.row] = -known;
+  w.size[member.row] = size;
 }
 
 void ArticulatedLoops::carry(const SweepInput<double>& in, int g) {
   const LoopGroup& group = groups_[g];
   Work& w = work_[g];
   const int n = group.rows;
-  place_forces(g);
+  place_forces(in, g);
   std::fill(w.Lambda.begin(), w.Lambda.end(), 0.0);
   std::fill(w.beta.begin(), w.beta.end(), 0.0);
   for (const auto& carrier : group.carriers) {
@@ -169,6 +220,11 @@ void ArticulatedLoops::factor(int g) {
   const int n = group.rows;
   for (size_t m = 0; m < group.members.size(); ++m) {
     const auto& member = group.members[m];
+    if (member.coupling >= 0) {
+      w.metric[m][0] = yielding_of(member);
+      cholesky_factor(1, w.metric[m].data(), 0.0);
+      continue;
+    }
     const LoopState& loop = states_[member.loop];
     Force<double> on_a[6], on_b[6];
     for (int i = 0; i < member.n_rows; ++i) {
@@ -304,10 +360,22 @@ void ArticulatedLoops::add_known_wrenches(const SweepInput<double>& in) {
   }
 }
 
+/// D of a coupling: what its joints yield to it, each alone.
+double ArticulatedLoops::yielding_of(const LoopGroup::Member& member) const {
+  const Coupling& coupling = model_.couplings[member.coupling];
+  double sum = 0;
+  for (size_t t = 0; t < coupling.terms.size(); ++t) {
+    const int k = terms_[member.coupling][t];
+    const Coupling::Term& term = coupling.terms[t];
+    if (k >= 0) sum += term.factor * term.factor * sweeps_.yielding(term.body, k);
+  }
+  return sum;
+}
+
 /// Wrenches of the joints of a group on their children.
 void ArticulatedLoops::add_to_load(int g, const double* f, std::vector<Force<double>>& load) const {
   for (const auto& member : groups_[g].members)
-    for (int i = 0; i < member.n_rows; ++i) {
+    for (int i = 0; member.loop >= 0 && i < member.n_rows; ++i) {
       const Force<double> Q = direction(states_[member.loop].basis.Q[i]);
       const double x = f[member.row + i];
       load[member.loop] += Force<double>{x * Q.lin, x * Q.ang};

@@ -47,7 +47,9 @@ class ArticulatedLoops {
   };
 
   void carry(const SweepInput<double>& in, int g);
-  void place_forces(int g);
+  void place_forces(const SweepInput<double>& in, int g);
+  void place_coupling(const SweepInput<double>& in, int g, const LoopGroup::Member& member);
+  double yielding_of(const LoopGroup::Member& member) const;
   void factor(int g);
   double solve(int g, std::vector<double>& x);
   void reduce_top(int g);
@@ -71,6 +73,7 @@ class ArticulatedLoops {
   };
   std::vector<Stage> stages_;
   std::vector<Compliance<double>> compliance_a_, compliance_b_;  ///< by loop
+  std::vector<std::vector<int>> terms_;  ///< by coupling: columns of its joints, -1: given motion
   LoopReport report_;
 };
 

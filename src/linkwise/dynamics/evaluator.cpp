@@ -93,7 +93,9 @@ class LoopInput {
 
   void add(size_t i, SweepInput<double>& in) {
     states_.update(in);
-    require_closed(model_, states_, several_ ? "state " + std::to_string(i) + ": " : "");
+    const std::string where = several_ ? "state " + std::to_string(i) + ": " : "";
+    require_closed(model_, states_, where);
+    require_coupled(model_, in.q, in.v, where);
     if (!passive_) return;
     tau_.assign(model_.loops.nv, 0.0);
     add_passive_forces(model_.loops, states_.q().data(), states_.v().data(), tau_.data());
@@ -116,7 +118,7 @@ void one_by_one(const Model& m, DynamicsMethod& method, size_t count, const Batc
     return rows_finite(out.acceleration, i, 1, m.nv()) && rows_finite(out.joint_load, i, 1, n_load);
   };
   std::optional<LoopInput> loops;
-  if (m.n_loops() > 0) loops.emplace(m, s, count);
+  if (m.is_constrained()) loops.emplace(m, s, count);
   for (size_t i = 0; i < count && go_on(); ++i) {
     SweepInput<double> in;
     in.q = s.q + i * m.nq();
@@ -271,7 +273,7 @@ Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const Dynami
   const bool is_auto = options.method == "auto";
   // This path builds no text: that would take as long as the dynamics of a small machine.
   if ((is_auto || options.method == "articulated_body") && options.solver == "auto") {
-    const bool alone = model_->n_loops() > 0 || (count == 1 && workspace.is_split());
+    const bool alone = model_->is_constrained() || (count == 1 && workspace.is_split());
     const Choice& by_default = workspace.default_choice();
     choice.method = alone && is_auto ? by_default.method : "articulated_body";
     if (alone && is_auto) choice.solver = by_default.solver;

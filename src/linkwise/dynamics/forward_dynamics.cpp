@@ -94,7 +94,7 @@ class ClosedLoops : public DynamicsMethod {
 
 std::unique_ptr<DynamicsMethod> make_articulated_body(const Model& model,
                                                       const DynamicsOptions& options) {
-  if (model.n_loops() > 0) return std::make_unique<ClosedLoops>(model);
+  if (model.is_constrained()) return std::make_unique<ClosedLoops>(model);
   if (paths_fill(model, native_lanes))
     return std::make_unique<Recursion<ArticulatedPaths<Lanes<native_lanes>>>>(model,
                                                                               options.executor);
@@ -178,10 +178,9 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
     if (options.solver != "auto") {
       choice.method = "constraint_force";
       choice.reason = "a solver was asked for, and only constraint_force uses one";
-    } else if (model.n_loops() > 0) {
+    } else if (model.is_constrained()) {
       choice.method = "articulated_body";
-      choice.reason = "joint '" + model.loops.joints.front().joint.name +
-                      "' closes a loop, which only the recursion takes";
+      choice.reason = "only the recursion takes closed loops and couplings";
     } else if (model.n_bodies() >= piecewise_from && Piecewise::suits(model)) {
       choice.method = "piecewise";
       choice.reason = "a revolute chain of " + std::to_string(model.n_bodies()) +
@@ -198,7 +197,6 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
   }
   const DynamicsEntry& entry = find_dynamics(choice.method);
   require_known_bodies(model, entry);
-  refuse_couplings(model, "method " + std::string(entry.name));
   if (!entry.takes_loops)
     refuse_loops(model, "method " + std::string(entry.name), "use method articulated_body");
   if (!entry.uses_solver)
@@ -209,7 +207,7 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
 }
 
 bool is_split(const Model& model) {
-  return model.n_loops() > 0 || choose_dynamics(model, {}).method == "piecewise" ||
+  return model.is_constrained() || choose_dynamics(model, {}).method == "piecewise" ||
          paths_fill(model, native_lanes) || Branches(model).any();
 }
 

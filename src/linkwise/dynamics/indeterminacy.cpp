@@ -13,7 +13,7 @@ namespace {
 constexpr double touched = 1e-8;
 
 double longest_loop(const Model& model, const LoopStates& states) {
-  double length = 0;
+  double length = model.n_loops() > 0 ? 0 : 1;
   for (int l = 0; l < model.n_loops(); ++l) length = std::max(length, states[l].length);
   return length;
 }
@@ -33,7 +33,7 @@ Indeterminacy find_indeterminacy(const Model& model, const double* q) {
   const size_t n_loads = model.n_loads();
   out.determinate.assign(6 * n_loads, 1);
   for (const Element& e : model.elements) out.mobility += e.prescribed ? 0 : e.nv;
-  if (model.n_loops() == 0) return out;
+  if (!model.is_constrained()) return out;
   ArticulatedLoops kernel(model);
   const std::vector<double> zero(model.nv());
   std::vector<double> du(model.nv()), loads(6 * n_loads);
@@ -42,6 +42,7 @@ Indeterminacy find_indeterminacy(const Model& model, const double* q) {
   in.tau = zero.data();
   const bool regular = kernel.evaluate(in, du.data(), loads.data());
   require_closed(model, kernel.states());
+  require_coupled(model, q, nullptr);
   if (!regular)
     throw InputError("body '" + model.body_name(kernel.failed_body()) + "'" + model.where() +
                      ": its articulated inertia is not positive definite; give it mass and "

@@ -31,18 +31,47 @@ void walk_inward(const Model& model, int body, int top, F&& f) {
   for (; body != top; body = model.topology[body].parent) f(body);
 }
 
+/// Bodies on which the forces of a member act; -1: the ground.
+std::vector<int> ends_of(const Model& model, const LoopGroup::Member& member) {
+  if (member.loop >= 0) {
+    const LoopJoint& loop = model.loops.joints[member.loop];
+    return {loop.parent_body, loop.joint.body};
+  }
+  std::vector<int> ends;
+  for (const Coupling::Term& term : model.couplings[member.coupling].terms)
+    ends.push_back(term.body);
+  return ends;
+}
+
+/// The innermost body that a member's paths start from. A coupling acts within joints, so its paths
+/// start inboard of them.
+int top_of(const Model& model, const LoopGroup::Member& member) {
+  std::vector<int> ends = ends_of(model, member);
+  if (member.coupling >= 0)
+    for (int& end : ends) end = model.topology[end].parent;
+  int top = ends[0];
+  for (int other : ends)
+    while (top != other) {  // the one with the higher number is no ancestor of the other
+      int& outer = top > other ? top : other;
+      outer = model.topology[outer].parent;
+    }
+  return top;
+}
+
+std::vector<int> bodies_of(const Model& model, const LoopGroup::Member& member, int top) {
+  std::vector<int> bodies;
+  for (const int end : ends_of(model, member))
+    walk_inward(model, end, top, [&](int body) { bodies.push_back(body); });
+  std::sort(bodies.begin(), bodies.end());
+  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
+  return bodies;
+}
+
 void add_carriers(const Model& model, LoopGroup& group) {
   std::map<int, std::vector<int>, std::greater<>> rows;  // by body, tip to base
-  for (const auto& member : group.members) {
-    const LoopJoint& loop = model.loops.joints[member.loop];
-    std::vector<int> path;
-    for (const int end : {loop.parent_body, loop.joint.body})
-      walk_inward(model, end, group.top, [&](int body) { path.push_back(body); });
-    std::sort(path.begin(), path.end());
-    path.erase(std::unique(path.begin(), path.end()), path.end());
-    for (const int body : path)
+  for (const auto& member : group.members)
+    for (const int body : bodies_of(model, member, group.top))
       for (int i = 0; i < member.n_rows; ++i) rows[body].push_back(member.row + i);
-  }
   std::map<int, const LoopGroup::Carrier*> known;
   group.carriers.reserve(rows.size());
   for (auto& [body, own] : rows) {
@@ -59,10 +88,18 @@ void add_carriers(const Model& model, LoopGroup& group) {
   for (auto& carrier : group.carriers)
     for (const int row : carrier.rows)
       carrier.to.push_back(column_of(model.topology[carrier.body].parent, row));
-  for (auto& member : group.members) {
-    member.on_a = column_of(model.loops.joints[member.loop].parent_body, member.row);
-    member.on_b = column_of(model.loops.joints[member.loop].joint.body, member.row);
-  }
+  for (auto& member : group.members)
+    for (const int end : ends_of(model, member)) member.at.push_back(column_of(end, member.row));
+}
+
+/// All loop joints that hold anything, and couplings; where in their group is not known yet.
+std::vector<LoopGroup::Member> all_members(const Model& model) {
+  std::vector<LoopGroup::Member> members;
+  for (int l = 0; l < model.n_loops(); ++l)
+    if (const int rows = loop_rows(model, model.loops.joints[l]); rows > 0)
+      members.push_back({l, -1, 0, rows, {}});
+  for (int c = 0; c < model.n_couplings(); ++c) members.push_back({-1, c, 0, 1, {}});
+  return members;
 }
 
 }  // namespace
@@ -76,27 +113,25 @@ int loop_rows(const Model& model, const LoopJoint& loop) {
 }
 
 std::vector<LoopGroup> make_loop_groups(const Model& model) {
-  const int n = model.n_loops();
-  Sets sets(n);
-  std::vector<int> first(model.n_bodies(), -1);  // loop that passes a body
-  std::vector<LoopPath> paths;
-  for (int l = 0; l < n; ++l) {
-    paths.push_back(loop_path(model, model.loops.joints[l]));
-    for (const auto* path : {&paths[l].to_a, &paths[l].to_b})
-      for (const int body : *path) {
-        if (first[body] >= 0) sets.join(first[body], l);
-        first[body] = l;
-      }
+  std::vector<LoopGroup::Member> members = all_members(model);
+  Sets sets(static_cast<int>(members.size()));
+  std::vector<int> first(model.n_bodies(), -1);  // member that passes a body
+  std::vector<int> tops;
+  for (int i = 0; i < static_cast<int>(members.size()); ++i) {
+    tops.push_back(top_of(model, members[i]));
+    for (const int body : bodies_of(model, members[i], tops[i])) {
+      if (first[body] >= 0) sets.join(first[body], i);
+      first[body] = i;
+    }
   }
   std::map<int, LoopGroup> by_set;
-  for (int l = 0; l < n; ++l) {
-    const int rows = loop_rows(model, model.loops.joints[l]);
-    if (rows == 0) continue;
-    const auto [at, is_new] = by_set.try_emplace(sets.find(l));
+  for (int i = 0; i < static_cast<int>(members.size()); ++i) {
+    const auto [at, is_new] = by_set.try_emplace(sets.find(i));
     LoopGroup& group = at->second;
-    group.top = is_new ? paths[l].meets : std::min(group.top, paths[l].meets);
-    group.members.push_back({l, group.rows, rows, 0, 0});
-    group.rows += rows;
+    group.top = is_new ? tops[i] : std::min(group.top, tops[i]);
+    members[i].row = group.rows;
+    group.rows += members[i].n_rows;
+    group.members.push_back(std::move(members[i]));
   }
   std::vector<LoopGroup> groups;
   for (auto& [set, group] : by_set) {

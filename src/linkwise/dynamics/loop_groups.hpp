@@ -1,7 +1,7 @@
 #pragma once
-// Loops that are eliminated together: those that share a body on their way inward. A group is
-// eliminated at its top, the innermost body at which paths of its loops meet, or at the ground.
-// There nothing but a change of that body's articulated inertia is left of it.
+// Loops and couplings that are eliminated together: those that share a body on their way inward. A
+// group is eliminated at its top, the innermost body at which paths of its loops meet, or at the
+// ground. There nothing but a change of that body's articulated inertia is left of it.
 #include <vector>
 
 #include "linkwise/kinematics/loop_states.hpp"
@@ -16,10 +16,13 @@ struct LoopGroup {
     int first;
     std::vector<int> to;  ///< column at the parent that each adds to, or -1 - row: at the top
   };
-  /// A joint's own rows [row, row + n_rows), and the columns, or -1 - row, where its forces act.
+  /// A loop joint or a coupling: its rows [row, row + n_rows), and the columns, or -1 - row, where
+  /// its forces act. Those of a joint are on its parent and its child, those of a coupling on the
+  /// body of each term.
   struct Member {
-    int loop, row, n_rows;
-    int on_a, on_b;
+    int loop = -1, coupling = -1;  ///< one of them
+    int row = 0, n_rows = 0;
+    std::vector<int> at;
   };
 
   int top = -1;

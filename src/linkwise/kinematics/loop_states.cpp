@@ -178,4 +178,26 @@ void require_closed(const Model& model, const LoopStates& states, const std::str
   }
 }
 
+void require_coupled(const Model& model, const double* q, const double* v,
+                     const std::string& where) {
+  constexpr double allowed = 1e-6;
+  for (const Coupling& coupling : model.couplings) {
+    double gap = -coupling.offset, slip = 0, size = 1 + std::abs(coupling.offset), speed = 1;
+    for (const Coupling::Term& term : coupling.terms) {
+      const double angle = term.factor * q[term.q], rate = v ? term.factor * v[term.v] : 0;
+      gap += angle;
+      slip += rate;
+      size += std::abs(angle);
+      speed += std::abs(rate);
+    }
+    const std::string name = "coupling '" + coupling.name + "'" + model.where();
+    if (!(std::abs(gap) <= allowed * size))
+      throw InputError(where + name + ": its coordinates add up to " + rounded(gap) +
+                       " beside its offset; give q that keeps it");
+    if (!(std::abs(slip) <= allowed * speed))
+      throw InputError(where + name + ": its rates add up to " + rounded(slip) +
+                       "; give v that keeps it");
+  }
+}
+
 }  // namespace linkwise

@@ -84,6 +84,10 @@ LoopMiss miss_of(const LoopState& state, const double* residuals);
 /// its length. `where`: begins the message.
 void require_closed(const Model& model, const LoopStates& states, const std::string& where = "");
 
+/// The same of couplings; v may be null.
+void require_coupled(const Model& model, const double* q, const double* v,
+                     const std::string& where = "");
+
 /// What wrench w of the joint on its child is on body b, and on body a, in the bodies' own frames.
 inline Force<double> wrench_on_b(const LoopJoint& loop, const Force<double>& w) {
   return transpose_times(loop.on_child, w);

@@ -164,19 +164,16 @@ std::vector<int> Model::joint_parents() const {
   return parents;
 }
 
-void refuse_couplings(const Model& model, const std::string& who) {
-  if (model.n_couplings() > 0)
-    throw InputError("model '" + model.spec().name + "'" + model.where() + ": coupling '" +
-                     model.couplings.front().name + "' ties joints together, and " + who +
-                     " takes none; remove the coupling");
-}
-
 void refuse_loops(const Model& model, const std::string& who, const std::string& remedy) {
-  refuse_couplings(model, who);
-  if (model.n_loops() == 0) return;
-  throw InputError("model '" + model.spec().name + "'" + model.where() + ": joint '" +
-                   model.loops.joints.front().joint.name + "' closes a loop, and " + who +
-                   " takes none; " + remedy);
+  if (!model.is_constrained()) return;
+  const bool loop = model.n_loops() > 0;
+  throw InputError("model '" + model.spec().name + "'" + model.where() + ": " +
+                   (loop ? "joint '" + model.loops.joints.front().joint.name + "' closes a loop"
+                         : "coupling '" + model.couplings.front().name + "' ties joints together") +
+                   ", and " + who + " takes none; " +
+                   (!remedy.empty() ? remedy
+                    : loop          ? "remove a joint of the loop"
+                                    : "remove the coupling"));
 }
 
 }  // namespace linkwise

@@ -135,6 +135,8 @@ class Model {
   int n_joints() const { return static_cast<int>(joints.size()); }
   int n_loops() const { return static_cast<int>(loops.joints.size()); }
   int n_couplings() const { return static_cast<int>(couplings.size()); }
+  /// Do loops or couplings tie the tree's coordinates to each other?
+  bool is_constrained() const { return n_loops() > 0 || n_couplings() > 0; }
   /// Rows of joint loads: the joints of the tree, then those that close loops.
   int n_loads() const { return n_joints() + n_loops(); }
   double total_mass() const { return total_mass_; }
@@ -193,11 +195,9 @@ class Model {
   NameIndex joint_by_name_, link_by_name_;
 };
 
-/// Throws InputError where the model has couplings: `who` takes none.
-void refuse_couplings(const Model& model, const std::string& who);
-/// Where it has loops or couplings.
-void refuse_loops(const Model& model, const std::string& who,
-                  const std::string& remedy = "remove a joint of the loop");
+/// Throws InputError where the model has loops or couplings: `who` takes none. Without a remedy it
+/// is to remove them.
+void refuse_loops(const Model& model, const std::string& who, const std::string& remedy = "");
 
 /// The bodies of a range, whose kind is known while compiling.
 template <class B>

@@ -10,7 +10,8 @@
 
 namespace linkwise {
 
-/// A unit force of a loop joint at one body.
+/// A unit force of a loop joint at one body. A coupling has no wrench: its unit force is a torque
+/// in each of the joints that it ties, which z is before the column is carried.
 template <class S>
 struct LoopColumn {
   Force<S> F;          ///< on the body; once carried: what its joint transmits, in the body's frame
@@ -23,7 +24,7 @@ struct LoopColumn {
 template <class J, class S>
 LW_INLINE int carry(const EliminatedAxis<S>& axis, const Motion<S>& c, double pitch,
                     LoopColumn<S>& column) {
-  column.z[0] = J::project(column.F, pitch);
+  column.z[0] += J::project(column.F, pitch);
   const S y = column.z[0] * axis.D_inverse;
   column.y[0] = y;
   column.F -= Force<S>{y * axis.U.lin, y * axis.U.ang};
@@ -34,7 +35,10 @@ LW_INLINE int carry(const EliminatedAxis<S>& axis, const Motion<S>& c, double pi
 template <class S>
 int carry(const GeneralState<S>& joint, const EliminatedStack<S>& stack, const Motion<S>& c,
           LoopColumn<S>& column) {
-  for (int k = 0; k < joint.n; ++k) column.z[k] = column.y[k] = dot(joint.P[k], column.F);
+  for (int k = 0; k < joint.n; ++k) {
+    column.z[k] += dot(joint.P[k], column.F);
+    column.y[k] = column.z[k];
+  }
   cholesky_solve(joint.n, stack.L, column.y);
   column.beta = S{};
   for (int k = 0; k < joint.n; ++k) {

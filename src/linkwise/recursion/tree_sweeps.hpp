@@ -196,6 +196,16 @@ class TreeSweeps {
     sweep_outward(model_, ranges, ground, acceleration_of, step);
   }
 
+  /// What column k of body n's joint, eliminated, yields to its own torque: an entry of D^-1.
+  S yielding(int n, int k) const {
+    const BodyTopology& at = model_.topology[n];
+    if (at.joint_kind != JointKind::general) return body_[n].axis.D_inverse;
+    S unit[6]{};
+    unit[k] = broadcast<S>(1);
+    cholesky_solve(general_[at.general].n, stack_[at.general].columns.L, unit);
+    return unit[k];
+  }
+
   /// Forces of loops on body n, whose joint is eliminated, carried across that joint. Returns how
   /// many columns the joint has.
   int carry_loops(const SweepInput<S>& in, int n, std::span<LoopColumn<S>> columns) const {

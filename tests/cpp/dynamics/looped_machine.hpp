@@ -110,6 +110,23 @@ struct LoopedMachine {
     model.loops.joints.push_back(loop);
   }
 
+  /// Ties one-axis joints of the tree to each other, as they stand.
+  void couple(int n_terms, Draws& draws) {
+    Coupling coupling;
+    coupling.name = "coupling" + std::to_string(model.couplings.size());
+    std::vector<int> joints;
+    for (int j = 0; j < tree.n_joints(); ++j)
+      if (tree.joints[j].nq == 1) joints.push_back(j);
+    for (int t = 0; t < n_terms && !joints.empty(); ++t) {
+      const auto chosen = joints.begin() + draws.below(static_cast<int>(joints.size()));
+      const JointInfo& joint = tree.joints[*chosen];
+      coupling.terms.push_back({*chosen, joint.body, joint.q, joint.v, draws.uniform(0.3, 2)});
+      coupling.offset += coupling.terms.back().factor * q[joint.q];
+      joints.erase(chosen);
+    }
+    if (!coupling.terms.empty()) model.couplings.push_back(coupling);
+  }
+
   /// Adds a wrench on a body, in its frame, to external wrenches [n_joints][6] of users' frames.
   void push(int body, const Force<double>& w, std::vector<double>& external) const {
     for (int j = 0; j < tree.n_joints(); ++j) {
@@ -141,6 +158,11 @@ struct LoopedMachine {
       for (int l = 0; l < model.n_loops(); ++l)
         columns.back().insert(columns.back().end(), states[l].slip,
                               states[l].slip + states[l].rows);
+      for (const Coupling& coupling : model.couplings) {
+        columns.back().push_back(0);
+        for (const Coupling::Term& term : coupling.terms)
+          if (term.v == k) columns.back().back() += term.factor;
+      }
       unit[k] = 0;
     }
     n_rows = columns.empty() ? 0 : static_cast<int>(columns[0].size());
