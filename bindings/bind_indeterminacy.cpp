@@ -23,7 +23,7 @@ nb::object determinate(const Found& found) {
 }
 
 nb::object self_stresses(const Found& found) {
-  NewArray out({size(found.all.n_self_stresses())}, {found.n_loads, 6});
+  NewArray out({size(found.all.n_self_stresses)}, {found.n_loads, 6});
   std::copy(found.all.self_stresses.begin(), found.all.self_stresses.end(), out.data);
   return read_only(out.array);
 }

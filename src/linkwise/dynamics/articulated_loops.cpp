@@ -8,10 +8,6 @@
 namespace linkwise {
 namespace {
 
-/// Pivots of the scaled Lambda below this are zero. Rounding errors leave 1e-16 of a zero; a gap of
-/// a loop, or the distance from a singular position, leaves its square.
-constexpr double null_pivot = 1e-10;
-
 /// Part of a list of ranges: bodies [begin, end).
 std::vector<KindRange> part_of(const std::vector<KindRange>& all, int begin, int end) {
   std::vector<KindRange> part;
@@ -92,9 +88,7 @@ ArticulatedLoops::ArticulatedLoops(const Model& model)
     Work& w = work_[g];
     w.columns.resize(groups_[g].columns);
     w.Psi.resize(rows);
-    w.metric.resize(groups_[g].members.size());
-    w.Lambda.resize(rows * rows);
-    w.scaled.resize(rows * rows);
+    systems_.emplace_back(groups_[g]);
     for (auto* x : {&w.beta, &w.r, &w.size, &w.f, &w.rhs}) x->resize(rows);
   }
   int end = model.n_bodies();
@@ -193,16 +187,16 @@ void ArticulatedLoops::place_coupling(const SweepInput<double>& in, int g,
 void ArticulatedLoops::carry(const SweepInput<double>& in, int g) {
   const LoopGroup& group = groups_[g];
   Work& w = work_[g];
-  const int n = group.rows;
+  LoopSystem& system = systems_[g];
   place_forces(in, g);
-  std::fill(w.Lambda.begin(), w.Lambda.end(), 0.0);
+  system.clear();
   std::fill(w.beta.begin(), w.beta.end(), 0.0);
   for (const auto& carrier : group.carriers) {
     const int count = static_cast<int>(carrier.rows.size());
     const std::span columns(w.columns.data() + carrier.first, static_cast<size_t>(count));
     const int dof = sweeps_.carry_loops(in, carrier.body, columns);
     for (int i = 0; i < count; ++i) {
-      double* const row = &w.Lambda[static_cast<size_t>(carrier.rows[i]) * n];
+      double* const row = system.row(carrier.rows[i]);
       for (int j = 0; j <= i; ++j)
         for (int k = 0; k < dof; ++k) row[carrier.rows[j]] += columns[i].z[k] * columns[j].y[k];
       w.beta[carrier.rows[i]] += columns[i].beta;
@@ -213,16 +207,15 @@ void ArticulatedLoops::carry(const SweepInput<double>& in, int g) {
   }
 }
 
-/// Lambda in coordinates in which D is 1, factored.
+/// D, and the factor of Lambda in coordinates in which D is 1.
 void ArticulatedLoops::factor(int g) {
   const LoopGroup& group = groups_[g];
-  Work& w = work_[g];
-  const int n = group.rows;
+  LoopSystem& system = systems_[g];
   for (size_t m = 0; m < group.members.size(); ++m) {
     const auto& member = group.members[m];
+    double* const D = system.metric(m);
     if (member.coupling >= 0) {
-      w.metric[m][0] = yielding_of(member);
-      cholesky_factor(1, w.metric[m].data(), 0.0);
+      D[0] = yielding_of(member);
       continue;
     }
     const LoopState& loop = states_[member.loop];
@@ -233,68 +226,13 @@ void ArticulatedLoops::factor(int g) {
       on_b[i] = wrench_on_b(model_.loops.joints[member.loop], Q);
       const Motion<double> a = compliance_a_[member.loop] * on_a[i],
                            b = compliance_b_[member.loop] * on_b[i];
-      for (int j = 0; j <= i; ++j) w.metric[m][packed(i, j)] = dot(a, on_a[j]) + dot(b, on_b[j]);
-    }
-    cholesky_factor(member.n_rows, w.metric[m].data(), 0.0);
-  }
-  // L^-1 Lambda L^-T, D = L L^T by blocks: rows, then columns of the lower triangle.
-  w.scaled = w.Lambda;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < i; ++j)
-      w.scaled[static_cast<size_t>(j) * n + i] = w.scaled[static_cast<size_t>(i) * n + j];
-  for (size_t m = 0; m < group.members.size(); ++m) {
-    const auto& member = group.members[m];
-    const double* L = w.metric[m].data();
-    double* const first = &w.scaled[static_cast<size_t>(member.row) * n];
-    for (int i = 0; i < member.n_rows; ++i) {
-      double* const row = first + static_cast<size_t>(i) * n;
-      for (int l = 0; l < i; ++l)
-        for (int j = 0; j < n; ++j)
-          row[j] -= L[packed(i, l)] * first[static_cast<size_t>(l) * n + j];
-      for (int j = 0; j < n; ++j) row[j] *= L[packed(i, i)];
-    }
-    for (int j = 0; j < n; ++j) {
-      double* const x = &w.scaled[static_cast<size_t>(j) * n + member.row];
-      for (int i = 0; i < member.n_rows; ++i) {
-        for (int l = 0; l < i; ++l) x[i] -= L[packed(i, l)] * x[l];
-        x[i] *= L[packed(i, i)];
-      }
+      for (int j = 0; j <= i; ++j) D[packed(i, j)] = dot(a, on_a[j]) + dot(b, on_b[j]);
     }
   }
-  w.factor.factor(n, w.scaled.data(), null_pivot);
-  report_.rows += n;
-  report_.rank += w.factor.rank();
-  report_.smallest_pivot = std::min(report_.smallest_pivot, w.factor.smallest_pivot());
-}
-
-/// x <- Lambda^+ x. Returns by how much the constraints contradict each other, where D is 1.
-double ArticulatedLoops::solve(int g, std::vector<double>& x) {
-  Work& w = work_[g];
-  const auto& members = groups_[g].members;
-  for (size_t m = 0; m < members.size(); ++m) {
-    const double* L = w.metric[m].data();
-    double* const own = &x[members[m].row];
-    for (int i = 0; i < members[m].n_rows; ++i) {
-      for (int l = 0; l < i; ++l) own[i] -= L[packed(i, l)] * own[l];
-      own[i] *= L[packed(i, i)];
-    }
-  }
-  const double missed = w.factor.solve(x.data(), x.data());
-  from_scaled(g, x.data());
-  return missed;
-}
-
-/// x <- L^-T x: forces from those where D is 1.
-void ArticulatedLoops::from_scaled(int g, double* x) const {
-  const auto& members = groups_[g].members;
-  for (size_t m = 0; m < members.size(); ++m) {
-    const double* L = work_[g].metric[m].data();
-    double* const own = x + members[m].row;
-    for (int i = members[m].n_rows - 1; i >= 0; --i) {
-      for (int l = i + 1; l < members[m].n_rows; ++l) own[i] -= L[packed(l, i)] * own[l];
-      own[i] *= L[packed(i, i)];
-    }
-  }
+  system.factor();
+  report_.rows += group.rows;
+  report_.rank += system.rank();
+  report_.smallest_pivot = std::min(report_.smallest_pivot, system.smallest_pivot());
 }
 
 /// What the group leaves on its top.
@@ -304,7 +242,7 @@ void ArticulatedLoops::reduce_top(int g) {
   Contribution<double> more{};
   for (int j = 0; j < 6; ++j) {
     for (int i = 0; i < n; ++i) w.rhs[i] = to_array(w.Psi[i])[j];
-    solve(g, w.rhs);
+    systems_[g].solve(w.rhs);
     for (int r = j; r < 6; ++r) {
       double sum = 0;
       for (int i = 0; i < n; ++i) sum += to_array(w.Psi[i])[r] * w.rhs[i];
@@ -312,7 +250,7 @@ void ArticulatedLoops::reduce_top(int g) {
     }
   }
   for (int i = 0; i < n; ++i) w.rhs[i] = w.r[i] - w.beta[i];
-  solve(g, w.rhs);
+  systems_[g].solve(w.rhs);
   for (int i = 0; i < n; ++i)
     more.p -= Force<double>{w.rhs[i] * w.Psi[i].lin, w.rhs[i] * w.Psi[i].ang};
   sweeps_.receive(groups_[g].top, more);
@@ -330,9 +268,9 @@ void ArticulatedLoops::solve_forces(const SweepInput<double>& in, int g, bool wi
       const int i = group.members[m].row + k;
       const double at_top = dot(a, w.Psi[i]);
       w.f[i] = w.r[i] - w.beta[i] - at_top;
-      asked = std::max(asked, (w.size[i] + std::abs(at_top)) * w.metric[m][packed(k, k)]);
+      asked = std::max(asked, (w.size[i] + std::abs(at_top)) * systems_[g].scale(m, k));
     }
-  const double missed = solve(g, w.f);
+  const double missed = systems_[g].solve(w.f);
   if (asked > 0) report_.contradiction = std::max(report_.contradiction, missed / asked);
   std::vector<double>& own = w.rhs;
   for (const auto& carrier : group.carriers) {
@@ -405,9 +343,8 @@ void ArticulatedLoops::store_loop_loads(const SweepInput<double>& in, double* lo
 
 void ArticulatedLoops::self_stress(int g, int k, const double* q, double* loads) const {
   const Work& w = work_[g];
-  std::vector<double> f(groups_[g].rows);
-  w.factor.null_vector(k, f.data());
-  from_scaled(g, f.data());
+  std::vector<double> f;
+  systems_[g].null_vector(k, f);
   std::vector<Force<double>> of_body(model_.n_bodies()), of_loop(model_.n_loops());
   for (const auto& carrier : groups_[g].carriers)
     for (size_t i = 0; i < carrier.rows.size(); ++i) {

@@ -13,7 +13,7 @@
 
 #include "linkwise/dynamics/loop_groups.hpp"
 #include "linkwise/dynamics/loop_report.hpp"
-#include "linkwise/linear/semidefinite.hpp"
+#include "linkwise/dynamics/loop_system.hpp"
 #include "linkwise/recursion/tree_sweeps.hpp"
 
 namespace linkwise {
@@ -32,18 +32,18 @@ class ArticulatedLoops {
   const std::vector<LoopGroup>& groups() const { return groups_; }
 
   // Of the last evaluation, with loads: forces of a group that cancel.
-  int n_self_stresses(int group) const { return groups_[group].rows - work_[group].factor.rank(); }
-  /// Joint loads [n_loads][6] of self-stress k.
+  int find_self_stresses(int group) {
+    systems_[group].factor_exactly();
+    return systems_[group].n_null();
+  }
+  /// Joint loads [n_loads][6] of self-stress k, found before.
   void self_stress(int group, int k, const double* q, double* loads) const;
 
  private:
   struct Work {
     std::vector<LoopColumn<double>> columns;
-    std::vector<Force<double>> Psi;              ///< [rows] on the top
-    std::vector<double> Lambda, scaled;          ///< [rows][rows], the latter where D is 1
-    std::vector<double> beta, r, size, f, rhs;   ///< [rows]; size: of what makes up beta and r
-    std::vector<std::array<double, 21>> metric;  ///< factor of D by member
-    SemidefiniteFactor factor;
+    std::vector<Force<double>> Psi;             ///< [rows] on the top
+    std::vector<double> beta, r, size, f, rhs;  ///< [rows]; size: of what makes up beta and r
   };
 
   void carry(const SweepInput<double>& in, int g);
@@ -51,11 +51,9 @@ class ArticulatedLoops {
   void place_coupling(const SweepInput<double>& in, int g, const LoopGroup::Member& member);
   double yielding_of(const LoopGroup::Member& member) const;
   void factor(int g);
-  double solve(int g, std::vector<double>& x);
   void reduce_top(int g);
   void solve_forces(const SweepInput<double>& in, int g, bool with_loads);
   void add_known_wrenches(const SweepInput<double>& in);
-  void from_scaled(int g, double* x) const;
   void add_to_load(int g, const double* f, std::vector<Force<double>>& load) const;
   void store_loop_loads(const SweepInput<double>& in, double* loads) const;
   void store_loop_load(int l, const Force<double>& w, double* loads) const;
@@ -65,6 +63,7 @@ class ArticulatedLoops {
   LoopStates states_;
   std::vector<LoopGroup> groups_;
   std::vector<Work> work_;
+  std::vector<LoopSystem> systems_;
   /// Ranges of bodies that are swept between the eliminations of groups, and how many groups are
   /// eliminated after each: tip to base.
   struct Stage {

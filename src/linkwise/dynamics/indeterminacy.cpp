@@ -48,17 +48,20 @@ Indeterminacy find_indeterminacy(const Model& model, const double* q) {
                      ": its articulated inertia is not positive definite; give it mass and "
                      "inertia");
   out.rows = kernel.report().rows;
-  out.rank = kernel.report().rank;
-  out.mobility -= out.rank;
   const double length = longest_loop(model, kernel.states());
-  for (int g = 0; g < static_cast<int>(kernel.groups().size()); ++g)
-    for (int k = 0; k < kernel.n_self_stresses(g); ++k) {
+  for (int g = 0; g < static_cast<int>(kernel.groups().size()); ++g) {
+    const int n = kernel.find_self_stresses(g);
+    for (int k = 0; k < n; ++k) {
       kernel.self_stress(g, k, q, loads.data());
       normalise(loads.data(), n_loads, length);
       for (size_t i = 0; i < loads.size(); ++i)
         if (std::abs(loads[i]) > touched * (i % 6 < 3 ? 1 : length)) out.determinate[i] = 0;
       out.self_stresses.insert(out.self_stresses.end(), loads.begin(), loads.end());
     }
+    out.n_self_stresses += n;
+  }
+  out.rank = out.rows - out.n_self_stresses;
+  out.mobility -= out.rank;
   return out;
 }
 

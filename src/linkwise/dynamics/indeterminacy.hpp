@@ -10,15 +10,14 @@
 namespace linkwise {
 
 struct Indeterminacy {
-  int rows = 0;      ///< directions that loop joints hold
-  int rank = 0;      ///< how many of them are independent
+  int rows = 0;  ///< directions that loop joints and couplings hold
+  int rank = 0;  ///< how many of them are independent
+  int n_self_stresses = 0;
   int mobility = 0;  ///< degrees of freedom that are left
   /// Joint loads of independent self-stresses, each with its largest force, or moment over the
-  /// loops' length, 1: [rows - rank][n_loads][6], in the users' frames as joint loads are.
+  /// loops' length, 1: [n_self_stresses][n_loads][6], in the users' frames as joint loads are.
   std::vector<double> self_stresses;
   std::vector<char> determinate;  ///< [n_loads][6]
-
-  int n_self_stresses() const { return rows - rank; }
 };
 
 /// At position q, which must close the loops: InputError otherwise.

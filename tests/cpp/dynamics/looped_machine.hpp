@@ -46,6 +46,38 @@ inline Transform<double> inverse(const Transform<double>& X) {
   return {transpose(X.R), -(X.R * X.r)};
 }
 
+/// n four-bars side by side on the ground, in a plane: unit rods stand on pins at (i, 0), and a bar
+/// leads from each tip to the next.
+inline ModelSpec row_of_four_bars(int n) {
+  ModelSpec spec;
+  spec.gravity = {0.3, -9.81, 0};
+  spec.links.push_back({"base", 0, {}, {}});
+  const auto hinge = [&](std::string name, std::string parent, std::string child,
+                         const Vec3<double>& at) {
+    JointSpec joint;
+    joint.name = std::move(name);
+    joint.parent = std::move(parent);
+    joint.child = std::move(child);
+    joint.translation = at;
+    joint.axes = {{AxisKind::revolute, {0, 0, 1}, 0}};
+    return joint;
+  };
+  for (int i = 0; i <= n; ++i) {
+    const std::string k = std::to_string(i), next = std::to_string(i + 1);
+    const double x = i;
+    spec.links.push_back({"rod" + k, 1, {0, 0.5, 0}, {{0.1, 0, 0.01, 0, 0, 0.1}}});
+    spec.joints.push_back(hinge("pin" + k, "base", "rod" + k, {x, 0, 0}));
+    if (i == n) break;
+    spec.links.push_back({"bar" + k, 1, {0.5, 0, 0}, {{0.01, 0, 0.1, 0, 0, 0.1}}});
+    spec.joints.push_back(hinge("left" + k, "rod" + k, "bar" + k, {0, 1, 0}));
+    LoopJointSpec loop;
+    loop.joint = hinge("right" + k, "bar" + k, "rod" + next, {1, 0, 0});
+    loop.child_translation = {0, 1, 0};
+    spec.loop_joints.push_back(loop);
+  }
+  return spec;
+}
+
 struct LoopedMachine {
   Model tree, model;  ///< without and with loops
   std::vector<double> q, v;
@@ -56,6 +88,17 @@ struct LoopedMachine {
     q = state.q;
     v = state.v;
   }
+
+  /// With the loops of a spec, at the zero position.
+  explicit LoopedMachine(const ModelSpec& spec)
+      : tree([&] {
+          ModelSpec open = spec;
+          open.loop_joints.clear();
+          return Model(open);
+        }()),
+        model(spec),
+        q(tree.neutral_configuration()),
+        v(tree.nv()) {}
 
   /// Joins bodies a and b (-1: ground) where they are.
   void close(JointType type, int a, int b, Draws& draws) {

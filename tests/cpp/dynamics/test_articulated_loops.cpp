@@ -270,6 +270,28 @@ TEST(ArticulatedLoops, CouplingsTieJointsAnywhere) {
   }
 }
 
+// All rods turn alike: (n + 1) / 3 + n times the angular acceleration is the torque of gravity.
+TEST(ArticulatedLoops, RowsOfFourBarsOfAnyLength) {
+  for (const int n : {1, 2, 12, 13, 40, 300}) {
+    SCOPED_TRACE(n);
+    const ModelSpec spec = row_of_four_bars(n);
+    LoopedMachine machine(spec);
+    for (int i = 0; i < machine.tree.nv(); ++i) machine.v[i] = i % 2 == 0 ? 0.7 : -0.7;
+    if (n <= 40) expect_motion(machine, 3, 2 * n);
+    const std::vector<double> tau(machine.tree.nv());
+    SweepInput<double> in = machine.input();
+    in.tau = tau.data();
+    std::vector<double> du(machine.tree.nv());
+    ArticulatedLoops kernel(machine.model);
+    ASSERT_TRUE(kernel.evaluate(in, du.data(), nullptr));
+    EXPECT_EQ(kernel.report().rank, 2 * n);
+    const double inertia = (n + 1) * (0.1 + 0.25) + n;
+    const double torque = -spec.gravity.x * ((n + 1) * 0.5 + n);
+    for (int i = 0; i < machine.tree.nv(); ++i)
+      EXPECT_NEAR(du[i], (i % 2 == 0 ? 1 : -1) * torque / inertia, 1e-10);
+  }
+}
+
 TEST(ArticulatedLoops, RandomTreesWithSeveralLoops) {
   for (int sample = 0; sample < 60; ++sample) {
     SCOPED_TRACE(sample);

@@ -1,0 +1,56 @@
+#pragma once
+// Lambda f = b of one group of loops, and the metric D in which the least f is taken where many
+// solve it. In coordinates in which D is 1 a small Lambda is factored by pivoting, and a large one
+// in the order of its rows, so that a row of many loops costs what is in its band.
+#include <array>
+#include <vector>
+
+#include "linkwise/dynamics/loop_groups.hpp"
+#include "linkwise/linear/profile.hpp"
+#include "linkwise/linear/semidefinite.hpp"
+
+namespace linkwise {
+
+class LoopSystem {
+ public:
+  explicit LoopSystem(const LoopGroup& group);
+
+  void clear();
+  /// Row i of Lambda, of which columns j <= i are asked.
+  double* row(int i) { return profile_.row(Lambda_.data(), i); }
+  /// D of a member, lower triangle, packed.
+  double* metric(size_t member) { return metric_[member].data(); }
+  void factor();
+
+  int rank() const { return is_small() ? exact_.rank() : shifted_.rank(); }
+  double smallest_pivot() const {
+    return is_small() ? exact_.smallest_pivot() : shifted_.smallest_pivot();
+  }
+  /// x <- Lambda^+ x. Returns by how much the constraints contradict each other, where D is 1.
+  double solve(std::vector<double>& x);
+  /// What a number asked of row i is where D is 1, or a bound of it.
+  double scale(size_t member, int k) const { return metric_[member][packed(k, k)]; }
+
+  // Null vectors, after factor_exactly(), which is dense.
+  void factor_exactly();
+  int n_null() const { return exact_.size() - exact_.rank(); }
+  void null_vector(int k, std::vector<double>& f) const;
+
+ private:
+  struct Block {
+    int row, n;
+  };
+  bool is_small() const { return profile_.size() <= 64; }
+  void scale_matrix();
+  void to_scaled(double* x) const;
+  void from_scaled(double* x) const;
+
+  std::vector<Block> blocks_;  ///< by member
+  Profile profile_;
+  std::vector<double> Lambda_, scaled_, dense_;
+  std::vector<std::array<double, 21>> metric_;  ///< D, then its factor
+  SemidefiniteFactor exact_;
+  ShiftedFactor shifted_;
+};
+
+}  // namespace linkwise
