@@ -50,7 +50,15 @@ BATCH = 5000
 #: Stored runs are many small files.
 MEMORY_DISK = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
 #: How many of a hundred inputs are of a kind; those of stored runs take longest.
-SHARES = {"urdf": 24, "mjcf": 20, "scenario": 14, "table": 14, "model-bytes": 13, "call": 14}
+SHARES = {
+    "urdf": 18,
+    "mjcf": 16,
+    "sdf": 10,
+    "scenario": 14,
+    "table": 14,
+    "model-bytes": 13,
+    "call": 14,
+}
 SHARES["stored-run"] = 1
 
 

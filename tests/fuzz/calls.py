@@ -67,6 +67,7 @@ CALLS = {
     "joint_loads_by_cause": "*causes *q *v tau:v external:wrenches method threads",
     "joint_poses": "*q threads",
     "link_poses": "*q threads",
+    "loop_gaps": "*q",
     "mass_matrix": "*q threads",
     "body_jacobian": "*q *body threads",
     "frame_pose": "*q *frame:link threads",
@@ -94,6 +95,8 @@ METHODS = {
     "with_joint": "*joint damping:number armature:number lower:number upper:number "
     "gear_ratio:number motor_inertia:number stiffness:number friction:number effort:number",
     "with_joints": "*joints:drives",
+    "with_loop": "*name:text *type:kind *parent:link *child:link translation:vector rotation "
+    "child_translation:vector child_rotation:rotation axis:vector pitch:number",
     "frame_placement": "*frame:link",
     "to_bytes": "source:text",
 }

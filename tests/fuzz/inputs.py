@@ -38,7 +38,22 @@ def mjcf(rng, folder):
     """A damaged MJCF is loaded, and its motion computed."""
     data = damage_xml(rng, rng.choice(seeds.mjcfs()), seeds.MJCF_WORDS)
     path = _write(rng, folder / "machine.xml", data)
-    return path.name, lambda: _compute(lw.load(path, keep_fixed=rng.random() < 0.3), rng)
+    options = {
+        "keep_fixed": rng.random() < 0.3,
+        "equality": rng.choice(("ignore", "exact")),
+    }
+    return path.name, lambda: _compute(lw.load(path, **options), rng)
+
+
+def sdf(rng, folder):
+    """A damaged SDF is loaded, and its motion computed."""
+    data = damage_xml(rng, rng.choice(seeds.SDFS), seeds.SDF_WORDS)
+    path = _write(rng, folder / "machine.sdf", data)
+    options = {
+        "mimic": rng.choice(("error", "independent")),
+        "keep_fixed": rng.random() < 0.3,
+    }
+    return path.name, lambda: _compute(lw.load(path, **options), rng)
 
 
 def scenario(rng, folder):
@@ -67,7 +82,7 @@ def table(rng, folder):
 
 def model_bytes(rng, folder):
     """A damaged description of a stored model."""
-    data = damage_bytes(rng, seeds.machine(rng.randrange(5)).to_bytes())
+    data = damage_bytes(rng, seeds.machine(rng.randrange(6)).to_bytes())
     return None, lambda: _compute(lw.Model.from_bytes(data), rng)
 
 
@@ -87,6 +102,7 @@ def stored_run(rng, folder):
 KINDS = {
     "urdf": urdf,
     "mjcf": mjcf,
+    "sdf": sdf,
     "scenario": scenario,
     "table": table,
     "model-bytes": model_bytes,
@@ -97,7 +113,7 @@ KINDS = {
 
 #: What inputs leave in their folder.
 FILES = {"machine.urdf", "machine.xml", "case.toml", "table.csv", "wrench.csv", "arm.urdf"}
-FILES |= {"tree.urdf", "run.zarr"}
+FILES |= {"tree.urdf", "run.zarr", "machine.sdf"}
 
 
 def _write(rng, path, data):

@@ -9,6 +9,9 @@ import numpy as np
 
 import linkwise as lw
 from helpers.arm_urdf import ARM
+from helpers.press_sdf import PRESS
+from linkwise.io.sdf import _READ
+from linkwise.io.sdf_frames import _ATTRIBUTES
 from linkwise.io.urdf_vocabulary import ATTRIBUTES
 from linkwise.scenario import schema
 
@@ -151,6 +154,17 @@ stiffness ref springref class file count fromto inertia diaginertia fullinertia 
 angle gravity timestep qpos qvel joint body1 body2 density builtin width height nrow ncol solref
 gear ctrlrange gravcomp mocap childclass prefix polycoef"""
 MJCF_WORDS = (_MJCF_ELEMENTS.split(), _MJCF_ATTRIBUTES.split())
+SDFS = (PRESS, PRESS.replace('type="prismatic"', 'type="ball"'))
+SDF_WORDS = (
+    [
+        *_READ,
+        "sdf",
+        "world",
+        "model",
+        *sorted({word for words in _READ.values() for word in words.split()}),
+    ],
+    sorted(_ATTRIBUTES | {"version"}),
+)
 SCENARIO_WORDS = sorted(
     {
         name
@@ -194,7 +208,14 @@ def _machines():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", lw.ModelWarning)
         tree = lw.load(TREE, floating_base=True, mimic="independent")
-    return (arm, tree, lw.scenes.chain(3), lw.scenes.tree(5, joint="universal"), _all_joints())
+    return (
+        arm,
+        tree,
+        lw.scenes.chain(3),
+        lw.scenes.tree(5, joint="universal"),
+        _all_joints(),
+        lw.scenes.benchmark("four_bars").model,
+    )
 
 
 def _all_joints():

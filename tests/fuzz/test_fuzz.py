@@ -10,7 +10,7 @@ from . import __main__ as runner
 from . import calls, inputs
 from .judge import judge
 
-COUNTS = {"urdf": 700, "mjcf": 500, "scenario": 300, "table": 500, "model-bytes": 1500}
+COUNTS = {"urdf": 700, "mjcf": 500, "sdf": 400, "scenario": 300, "table": 500, "model-bytes": 1500}
 COUNTS |= {"call": 1500, "stored-run": 12}
 
 

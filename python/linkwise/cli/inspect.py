@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from linkwise._core import Model
 
 _MOST_ROWS = 60
+#: The rank of larger loops takes too long to look at a file.
+_MOST_LOOP_ROWS = 600
 _LIMITS = ("lower", "upper", "effort", "velocity")
 #: What acts on a joint, each with what says how.
 _ACTING = {
@@ -88,13 +91,16 @@ def describe_model(model: Model) -> dict[str, Any]:
         "gravity": model.gravity,
         "joints": joints,
         "loops": _loops(model),
-        "counted_mobility": model.nv - sum(6 - freedom for freedom in model.loop_nv),
+        "couplings": model.coupling_names,
+        **_mobility(model),
         "notes": [{"level": n.level, "element": n.element, "text": n.text} for n in model.notes],
     }
 
 
 def _loops(model: Model) -> list[dict[str, Any]]:
-    """The joints that close loops."""
+    """The joints that close loops, and how far each is from that in the pose that is drawn."""
+    from linkwise._core import loop_gaps
+
     return [
         {
             "joint": name,
@@ -103,17 +109,40 @@ def _loops(model: Model) -> list[dict[str, Any]]:
             "parent": parent,
             "child": child,
             "degrees_of_freedom": freedom,
+            "gap": {"shift": float(gap[0]), "turn": float(gap[1])},
         }
-        for name, kind, axes, parent, child, freedom in zip(
+        for name, kind, axes, parent, child, freedom, gap in zip(
             model.loop_names,
             model.loop_types,
             model.loop_axes,
             model.loop_parent_link_names,
             model.loop_child_link_names,
             model.loop_nv,
+            loop_gaps(model, model.initial_configuration()),
             strict=True,
         )
     ]
+
+
+def _mobility(model: Model) -> dict[str, int | None]:
+    """Degrees of freedom by counting, as if nothing held the same twice, and in the pose that is
+    drawn, with how many loads are held more than once there; None where it does not close."""
+    from linkwise._core import InputError, indeterminacy
+
+    rows = sum(6 - freedom for freedom in model.loop_nv)
+    counted = model.nv - rows - len(model.coupling_names)
+    found: dict[str, int | None] = {
+        "counted_mobility": counted,
+        "mobility": None,
+        "self_stresses": None,
+    }
+    if not rows or rows > _MOST_LOOP_ROWS:
+        return found
+    try:
+        held = indeterminacy(model, model.initial_configuration())
+    except InputError:
+        return found
+    return found | {"mobility": held.mobility, "self_stresses": held.rows - held.rank}
 
 
 def _plural(count: int, noun: str, nouns: str = "") -> str:
@@ -135,15 +164,19 @@ def _headline(found: dict[str, Any]) -> str:
 
 
 def _said_of_loops(found: dict[str, Any]) -> str:
-    """What counting says, as if no two joints held the same."""
-    if not found["loops"]:
-        return ""
-    joints = _plural(len(found["loops"]), "joint closes a loop", "joints close loops")
-    taken = sum(6 - loop["degrees_of_freedom"] for loop in found["loops"])
-    return (
-        f"; {joints}: {found['nv']} - {taken} = {found['counted_mobility']} degrees of freedom "
-        "by counting"
-    )
+    loops, couplings = found["loops"], found["couplings"]
+    said = f"; {_plural(len(couplings), 'coupling')}" if couplings else ""
+    if not loops:
+        return said
+    joints = _plural(len(loops), "joint closes a loop", "joints close loops")
+    taken = sum(6 - loop["degrees_of_freedom"] for loop in loops) + len(couplings)
+    counted = found["counted_mobility"]
+    said += f"; {joints}: {found['nv']} - {taken} = {counted} degrees of freedom by counting"
+    if found["mobility"] is not None:
+        said += f", {found['mobility']} as drawn"
+    if found["self_stresses"]:
+        said += f", with {_plural(found['self_stresses'], 'self-stress', 'self-stresses')}"
+    return said
 
 
 def _axis(axis: Sequence[float]) -> str:
@@ -197,10 +230,13 @@ def _loop_table(loops: Sequence[dict[str, Any]], most: int) -> Any:
     title = "Joints that close loops"
     if len(loops) > most:
         title += f" (the first {most} of {len(loops)}; --all shows all)"
-    made = table(title, [(name, "left") for name in ("joint", "type", "axis", "parent", "child")])
+    columns = [(name, "left") for name in ("joint", "type", "axis", "parent", "child")]
+    made = table(title, [*columns, ("apart [mm]", "right"), ("apart [deg]", "right")])
     for loop in loops[:most]:
         ends = (text(loop["parent"]), text(loop["child"]))
-        made.add_row(text(loop["joint"]), loop["type"], _axes_cell(loop), *ends)
+        apart = (1e3 * loop["gap"]["shift"], math.degrees(loop["gap"]["turn"]))
+        cells = (_axes_cell(loop), *ends, *(f"{gap:.3g}" if gap > 1e-9 else "0" for gap in apart))
+        made.add_row(text(loop["joint"]), loop["type"], *cells)
     return made
 
 

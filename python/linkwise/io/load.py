@@ -52,8 +52,8 @@ def load(
         the joints of one link by name, so that q, v and tau can be handed over as they are.
     keep_fixed: keep fixed joints that carry mass as joints with a load instead of merging
         their links.
-    mimic: mimic joints of URDF and SDF are refused ("error"), for couplings are not supported, or
-        they move "independent" of each other, with a warning note.
+    mimic: mimic joints of URDF and SDF are refused ("error"), tied to the joint that they follow
+        ("couple"), or they move "independent" of each other, with a warning note.
     equality: an MJCF's connect and weld constraints are left out with a warning ("ignore"), or are
         spherical and fixed joints that close loops ("exact").
 

@@ -23,7 +23,7 @@ from linkwise._core import InputError, Model, ModelBuilder
 from linkwise.base import Array
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.sdf_frames import MODEL, WORLD, Frames, SdfElement, pose_of, quaternion_of
-from linkwise.io.urdf import Mimic
+from linkwise.io.urdf import MIMIC_REMEDY, Mimic
 from linkwise.io.xml import is_foreign, local_name
 
 #: Joint types of the format, with their names here and how many axes they have.
@@ -115,6 +115,7 @@ class _Reader:
             model.fail("is static, so nothing in it moves", "remove <static>")
         self._frames = Frames(path, model)
         self._joints: list[SdfElement] = []
+        self._couplings: list[tuple[str, dict[str, float], float]] = []
         for child in element.iterchildren(tag=etree.Element):
             tag = local_name(child)
             if tag in ("include", "model"):
@@ -248,6 +249,23 @@ class _Reader:
                 **placed,
             )
 
+        for coupling, factors, offset in self._couplings:
+            builder.add_coupling(coupling, factors, offset=offset)
+
+    def _couple(self, name: str, axis: SdfElement, mimic: SdfElement) -> None:
+        """follower = multiplier (leader - reference) + offset, as the format says."""
+        leader = mimic.get("joint") or ""
+        if leader == name:
+            axis.fail("mimics itself", "name another joint")
+        if f"joint '{leader}'" not in self._found:
+            axis.fail(f"mimics joint '{shorten(leader)}', which does not exist", "name a joint")
+        multiplier, offset, reference = (
+            default if mimic.get(key) is None else mimic.number(key, f"mimic {key}")
+            for key, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
+        )
+        factors = {name: 1.0, leader: -multiplier}
+        self._couplings.append((f"{name}_mimic", factors, offset - multiplier * reference))
+
     def _tree(self, joints: list[SdfJoint]) -> tuple[dict[str, SdfJoint], list[str]]:
         """By link the joint that it hangs on, breadth first, and the links that hang on none."""
         outboard: dict[str, list[SdfJoint]] = {}
@@ -366,11 +384,11 @@ class _Reader:
         if mimic is not None:
             target = shorten(mimic.get("joint") or "")
             if self._mimic == "error":
-                axis.fail(
-                    f"mimics joint '{target}', and couplings are not supported",
-                    'let it move on its own with mimic="independent", or remove <mimic>',
-                )
-            self._warn(name, f"mimics joint '{target}': the coupling is ignored")
+                axis.fail(f"mimics joint '{target}'", MIMIC_REMEDY)
+            if self._mimic == "couple":
+                self._couple(name, axis, mimic)
+            else:
+                self._warn(name, f"mimics joint '{target}': the coupling is ignored")
         dynamics, limit = axis.child("dynamics"), axis.child("limit")
         for key, element in (
             ("damping", "damping"),
@@ -413,6 +431,8 @@ class _Reader:
         """The core's complaint, ELEMENT of FILE: PROBLEM; REMEDY, as FILE:LINE: ELEMENT: ..."""
         element, _, rest = str(error).partition(f" of {file_name(self._path)}")
         found = self._found.get(element)
+        if element.startswith("coupling '"):
+            found = self._found.get(f"joint '{element[10:-1].removesuffix('_mimic')}'")
         line = f":{found.line}" if found is not None and found.line else ""
         text = shorten(f"{element}{rest}", 2000)
         return InputError(f"{shorten(os.fspath(self._path), 400)}{line}: {text}")

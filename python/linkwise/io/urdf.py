@@ -23,9 +23,14 @@ from linkwise.io.urdf_transmissions import Transmissions
 from linkwise.io.urdf_vocabulary import ATTRIBUTES, Vocabulary
 from linkwise.io.xml import is_foreign, local_name
 
-Mimic = Literal["independent", "error"]
+Mimic = Literal["independent", "error", "couple"]
 JointOrder = Literal["file", "pinocchio"]
 
+#: What to do about a mimic joint where couplings are no option that was chosen.
+MIMIC_REMEDY = (
+    'couple them with mimic="couple", let it move on its own with mimic="independent", or remove '
+    "<mimic>"
+)
 JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 _LIMITED = ("revolute", "prismatic")
 _LIMITS = ("lower", "upper", "effort", "velocity")
@@ -60,9 +65,9 @@ def read_urdf(
 
     Conventions of the format: a missing axis is 1 0 0; a planar joint's axis is the normal of its
     plane; inertia is about the centre of mass along the axes of the inertial origin. A revolute or
-    prismatic joint without <limit> is unlimited and noted. Mimic joints are kept as joints of
-    their own and noted as warnings ("independent", what Pinocchio does unless asked otherwise) or
-    refused ("error").
+    prismatic joint without <limit> is unlimited and noted. Mimic joints are coupled ("couple"),
+    kept as joints of their own and noted as warnings ("independent", what Pinocchio does unless
+    asked otherwise) or refused ("error").
     """
     reader = _Reader(path, root, mimic)
     name = root.get("name") or os.path.splitext(os.path.basename(os.fspath(path)))[0]
@@ -73,6 +78,7 @@ def read_urdf(
     reader.add_rotors(joints, root)
     for joint in depth_first(joints) if joint_order == "pinocchio" else joints:
         builder.add_joint(joint.name, joint.type, joint.parent, joint.child, **joint.properties)
+    reader.add_couplings(builder)
     reader.note_units(joints)
     if floating_base:
         builder.set_floating_base()
@@ -128,7 +134,7 @@ class _Reader:
         self.links: list[UrdfElement] = []
         self.joints: list[UrdfElement] = []
         self._mimic = mimic
-        self._mimics: dict[str, str] = {}
+        self._mimics: dict[str, tuple[str, float, float]] = {}  # of whom, multiplier, offset
         self._inertials: dict[str, tuple[float, Array, Array]] = {}
         self._found: dict[str, UrdfElement] = {}
         self._first: dict[str, UrdfElement] = {}  # of those whose name is used again
@@ -259,18 +265,29 @@ class _Reader:
         mimic = element.child("mimic")
         if mimic is None:
             return
-        for attribute in ("multiplier", "offset"):
-            if mimic.get(attribute) is not None:
-                mimic.number(attribute, f"mimic {attribute}")
+        multiplier, offset = (
+            default
+            if mimic.get(attribute) is None
+            else mimic.number(attribute, f"mimic {attribute}")
+            for attribute, default in (("multiplier", 1.0), ("offset", 0.0))
+        )
         target = mimic.get("joint")
         if not target:
             mimic.fail("<mimic> names no joint", 'add joint="..." or remove it')
         if self._mimic == "error":
-            element.fail(
-                f"mimics joint '{shorten(target)}', and couplings are not supported",
-                'let it move on its own with mimic="independent", or remove <mimic>',
-            )
-        self._mimics[name] = target
+            element.fail(f"mimics joint '{shorten(target)}'", MIMIC_REMEDY)
+        if self._mimic == "couple" and target == name:
+            element.fail("mimics itself", "name another joint")
+        if self._mimic == "couple" and f"joint '{target}'" not in self._found:
+            element.fail(f"mimics joint '{shorten(target)}', which does not exist", "name a joint")
+        self._mimics[name] = (target, multiplier, offset)
+
+    def add_couplings(self, builder: ModelBuilder) -> None:
+        """joint = multiplier times the other + offset, where mimic joints are coupled."""
+        if self._mimic != "couple":
+            return
+        for joint, (target, multiplier, offset) in self._mimics.items():
+            builder.add_coupling(f"{joint}_mimic", {joint: 1, target: -multiplier}, offset=offset)
 
     def add_rotors(self, joints: list[UrdfJoint], root: etree._Element) -> None:
         """Gives joints the rotors of their transmissions, and notes them."""
@@ -305,7 +322,7 @@ class _Reader:
 
     def note_what_is_left_out(self) -> None:
         # A target that does not exist is no error: the coupling is not used either way.
-        for joint, target in self._mimics.items():
+        for joint, (target, *_) in self._mimics.items() if self._mimic == "independent" else ():
             missing = "" if f"joint '{target}'" in self._found else ", which does not exist"
             self._note(
                 joint,
@@ -321,6 +338,8 @@ class _Reader:
         """The core's complaint, ELEMENT of FILE: PROBLEM; REMEDY, as FILE:LINE: ELEMENT: ..."""
         element, _, rest = str(error).partition(f" of {file_name(self.path)}")
         found = self._found.get(element)
+        if element.startswith("coupling '"):
+            found = self._found.get(f"joint '{element[10:-1].removesuffix('_mimic')}'")
         words = rest.removeprefix(": ").split()
         if found is None:  # links 'a' and 'b'
             found = self._found.get("link " + element.rpartition(" and ")[2])

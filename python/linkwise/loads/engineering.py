@@ -59,9 +59,10 @@ assert tuple(QUANTITIES) == DERIVED
 
 
 def joint_directions(model: Model) -> Array:
-    """Direction of each joint's axis in its frame (joint, 3); NaN where it has no single one."""
-    found = np.full((model.n_joints, 3), np.nan)
-    listed = model.joint_axes
+    """Direction of each joint's axis in its frame (joint, 3), of those that close loops behind
+    those of the tree; NaN where it has no single one."""
+    found = np.full((model.n_joints + model.n_loops, 3), np.nan)
+    listed = [*model.joint_axes, *model.loop_axes]
     single = [k for k, axes in enumerate(listed) if len(axes) == 1]
     if single:
         directions = np.array([listed[k][0][1] for k in single], dtype=np.float64)

@@ -92,7 +92,7 @@ def model_of(run: RunLike, model: Model | None) -> Model:
     same = all(attrs.get(name, count) == count for name, count in size.items())
     recorded = run.dataset.coords.get("joint")
     names = set() if recorded is None else {str(name) for name in recorded.values}
-    if not (same and names <= set(model.joint_names)):
+    if not (same and names <= {*model.joint_names, *model.loop_names}):
         raise InputError("model: is not the one that the run was made with; give that one")
     if own is None and model.hash != attrs.get("model_hash", model.hash):
         warnings.warn(
@@ -119,6 +119,8 @@ def _move_alike(one: Model, other: Model) -> bool:
         return True
     if one.joint_names != other.joint_names or one.joint_types != other.joint_types:
         return False
+    if one.n_loops or other.n_loops or one.coupling_names or other.coupling_names:
+        return False  # their loads depend on more than the motion
     v, a = np.random.default_rng(1).normal(size=(2, one.nv))
     loads = []
     for model in (one, other):
@@ -139,7 +141,8 @@ def held_model(run: RunLike) -> Model | None:
 
 @dataclass(frozen=True)
 class Selection:
-    """The recorded joints in the model: their indices, and which joint each of their dofs has."""
+    """The recorded joints in the model: their indices among the loads, where the joints that
+    close loops stand behind those of the tree, and which joint each of their dofs has."""
 
     model: Model
     joints: npt.NDArray[np.intp]
@@ -147,13 +150,14 @@ class Selection:
 
     @property
     def whole(self) -> bool:
-        return bool(self.joints.size == self.model.n_joints)
+        return bool(self.joints.size == self.model.n_joints + self.model.n_loops)
 
 
 def select(run: RunLike, model: Model) -> Selection:
-    where = {name: k for k, name in enumerate(model.joint_names)}
+    where = {name: k for k, name in enumerate([*model.joint_names, *model.loop_names])}
     joints = np.array([where[name] for name in joint_names(run)], dtype=np.intp)
-    nv = np.asarray(model.joint_nv, dtype=np.intp)[joints]
+    of_each = [*model.joint_nv, *(0 for _ in model.loop_names)]  # loops have no drives
+    nv = np.asarray(of_each, dtype=np.intp)[joints]
     return Selection(model, joints, np.repeat(np.arange(joints.size), nv))
 
 
@@ -162,9 +166,10 @@ def need_whole(run: RunLike, model: Model, *names: str) -> Selection:
     need(run, *names)
     found = select(run, model)
     if not found.whole:
+        count = model.n_joints + model.n_loops
         raise InputError(
-            f"run holds {found.joints.size} of {model.n_joints} joints; this needs a run of all "
-            "joints (simulate without joints=)"
+            f"run holds {found.joints.size} of {count} joints; this needs a run of all joints "
+            "(simulate without joints=)"
         )
     return found
 

@@ -459,7 +459,7 @@ def with_inertias(source: ScenarioSource, model: Model) -> Model:
 
 
 def with_loops(source: ScenarioSource, model: Model) -> Model:
-    """The model with the joints that close loops in the scenario."""
+    """The model with what ties links and joints together in the scenario."""
     for name, loop in source.settings.loop.items():
         keys = ("loop", name)
         for end in ("parent", "child"):
@@ -482,6 +482,21 @@ def with_loops(source: ScenarioSource, model: Model) -> Model:
         except InputError as error:
             problem, _, remedy = str(error).partition("; ")
             source.complain(keys, problem, remedy or "correct it")
+    for name, rod in source.settings.rod.items():
+        keys = ("rod", name)
+        for end in ("parent", "child"):
+            _check_link(source, model, getattr(rod, end), (*keys, end))
+        try:
+            model = model.with_rod(name, **rod.model_dump())
+        except InputError as error:
+            problem, _, remedy = str(error).partition("; ")
+            source.complain(keys, problem, remedy or "correct it")
+    for name, coupling in source.settings.coupling.items():
+        try:
+            model = model.with_coupling(name, coupling.factors, offset=coupling.offset)
+        except InputError as error:
+            problem, _, remedy = str(error).partition("; ")
+            source.complain(("coupling", name), problem, remedy or "correct it")
     return model
 
 

@@ -332,6 +332,23 @@ class LoopSection(JointSection):
         return self
 
 
+class RodSection(Section):
+    """A rod without mass between a ball on each of two links."""
+
+    parent: str
+    child: str
+    length: Annotated[float, _of("length"), Field(gt=0)]
+    point: Point | None = None
+    child_point: Point | None = None
+
+
+class CouplingSection(Section):
+    """Coordinates tied together: the sum of factor times coordinate is offset, in SI units."""
+
+    factors: Annotated[dict[str, Number], Field(min_length=1)]
+    offset: Number = 0.0
+
+
 Force = Annotated[float, _of("force"), Field(gt=0)]
 Moment = Annotated[float, _of("moment"), Field(gt=0)]
 
@@ -395,7 +412,7 @@ class ScenarioFile(Section):
     floating_base: bool = False
     joint_order: Literal["file", "pinocchio"] = "file"
     keep_fixed: bool = False
-    mimic: Literal["error", "independent"] = "error"
+    mimic: Literal["error", "independent", "couple"] = "error"
     equality: Literal["ignore", "exact"] = "ignore"
     package_dirs: list[str] = []
     initial: InitialSection = InitialSection()
@@ -405,6 +422,8 @@ class ScenarioFile(Section):
     link: dict[str, LinkSection] = {}
     joint: dict[str, JointSection] = {}
     loop: dict[str, LoopSection] = {}
+    rod: dict[str, RodSection] = {}
+    coupling: dict[str, CouplingSection] = {}
     rating: dict[str, RatingSection] = {}
     simulate: SimulateSection
     output: OutputSection = OutputSection()
@@ -431,6 +450,8 @@ _NAMED: dict[str, type[Section]] = {
     "link": LinkSection,
     "joint": JointSection,
     "loop": LoopSection,
+    "rod": RodSection,
+    "coupling": CouplingSection,
     "rating": RatingSection,
 }
 

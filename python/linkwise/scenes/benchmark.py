@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError, ModelBuilder
-from linkwise.scenes.chain import check_count
+from linkwise.scenes.chain import check_bodies, check_count
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -51,9 +51,10 @@ def benchmark(name: str, *, n: int = 2) -> Benchmark:
     n: linkages of "four_bars".
 
     A planar machine moves in x, y. Every joint that closes a loop is closed where it starts.
-    Raises InputError for another name or n.
+    Raises InputError for another name or n, MemoryError where there is no room for n.
     """
     check_count("n", n)
+    check_bodies(2 * n + 1)
     if name not in _MAKERS:
         raise InputError(f"benchmark {name!r:.60} is unknown; known: {', '.join(_MAKERS)}")
     return four_bars(n) if name == "four_bars" else _MAKERS[name]()

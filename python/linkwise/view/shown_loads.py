@@ -92,7 +92,7 @@ class RatingUse:
     """How much of their ratings loads use; NaN for joints without any."""
 
     def __init__(self, model: Model, ratings: Mapping[str, Rating]) -> None:
-        self.directions = joint_directions(model)
+        self.directions = joint_directions(model)[: model.n_joints]
         names = [name for half in _HALVES for name in half]
         table = rating_table(ratings, model.joint_names, [*names, "drive_power"])
         self.limits = dict(zip(names, table, strict=False))

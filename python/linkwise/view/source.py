@@ -69,14 +69,14 @@ class Recording:
         if loads:
             self.causes = CauseLoads(run, model)
             peaks = run.peak_loads()
-            self.peaks = np.asarray(peaks["force"].values)
+            self.peaks = np.asarray(peaks["force"].values)[: model.n_joints]
             self.largest = (float(peaks["force"].max()), float(peaks["moment"].max()))
 
     def _check(self, run: Run, model: Model) -> None:
         held = run.dataset
         needed = {"position": model.nq}
         if self.has_loads:
-            needed["joint_load"] = model.n_joints
+            needed["joint_load"] = model.n_joints + model.n_loops
         for name, count in needed.items():
             if name not in held:
                 remedy = " or view it with --no-loads" if name == "joint_load" else ""
@@ -100,7 +100,7 @@ class Recording:
             block = slice(self._first, self._last)
             self._positions = rows(self._run, "position", block)
             if self.has_loads:
-                self._loads = rows(self._run, "joint_load", block)
+                self._loads = rows(self._run, "joint_load", block)[:, : self.peaks.size]
         return sample - self._first
 
     def position(self, sample: int) -> Array:
@@ -149,7 +149,10 @@ class Source:
 
 
 def static_loads(model: Model, q: Array) -> Array:
-    """Loads (n_joints, 6) while the machine is held still in the pose q."""
+    """Loads (n_joints, 6) while the machine is held still in the pose q; of machines with loops
+    zeros, because how these share the weight depends on what holds them."""
+    if model.n_loops or model.coupling_names:
+        return np.zeros((model.n_joints, 6))
     rest = np.zeros(model.nv)
     return inverse_dynamics_loads(model, q, rest, rest)
 
@@ -171,7 +174,10 @@ def open_source(target: PathLike, options: Options) -> Source:
     held = load_scenario(path).text if path.suffix.lower() == ".toml" else ""
     ratings = _ratings(options, held)
     ignored = plain_warnings(warnings_of(model))
-    return Source(model.name, model, appearance, None, ratings, _notes(appearance), ignored)
+    notes = _notes(appearance)
+    if model.n_loops:
+        notes.append("loads of machines with closed loops are those of a run; poses may open loops")
+    return Source(model.name, model, appearance, None, ratings, notes, ignored)
 
 
 def _ratings(options: Options, scenario: str) -> Mapping[str, Rating]:

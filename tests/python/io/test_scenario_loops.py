@@ -130,11 +130,47 @@ def test_inspect_shows_it(linkwise, write):
     found = linkwise("inspect", write(LOOP), "--json").json
     assert found["counted_mobility"] == found["nv"] - 5
     assert [loop["joint"] for loop in found["loops"]] == ["brace"]
+    shift = found["loops"][0]["gap"]["shift"]
+    assert shift == pytest.approx(lw.loop_gaps(load(write(LOOP)), [0.0, 0.0])[0, 0])
+    assert shift > 0.1
+    assert found["mobility"] is None  # the pose that is drawn does not close it
     shown = linkwise("inspect", write(LOOP)).out
     assert "Joints that close loops" in shown
     assert f"1 joint closes a loop: {found['nv']} - 5 = {found['nv'] - 5} degrees" in " ".join(
         shown.split()
     )
+
+
+def test_rods_and_couplings(write):
+    text = """[rod.link]
+parent = "base"
+child = "lower"
+length = "40 cm"
+child_point = [0, 0, "20 cm"]
+[coupling.rack]
+factors = { shoulder = 0.1, slide = -1 }
+offset = 0.02
+"""
+    model = load(write(text))
+    assert (model.loop_names, model.loop_types) == (["link"], ["rod"])
+    assert model.coupling_names == ["rack"]
+    np.testing.assert_array_equal(model.loop_placements[0, 1, :3, 3], [0, 0, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('[rod.x]\nparent = "base"\nchild = "lower"\n', "rod.x.length: is missing"),
+        ('[rod.x]\nparent = "base"\nchild = "lower"\nlength = 0\n', "rod.x.length: is 0"),
+        ('[rod.x]\nparent = "bas"\nchild = "lower"\nlength = 1\n', "rod.x.parent: the model has"),
+        ("[coupling.x]\nfactors = { shoulder = 1, slid = 1 }\n", "coupling.x: "),
+        ("[coupling.x]\nfactors = {}\n", "coupling.x.factors: "),
+        ('[coupling.x]\nfactors = { slide = "1 m" }\n', "coupling.x.factors.slide: "),
+    ],
+)
+def test_what_is_wrong_with_rods_and_couplings(write, complaint, text, said):
+    message = complaint(load, write(text))
+    assert message.startswith(f": {said}"), message
 
 
 def test_with_loop_refuses_as_the_builder_does(arm):

@@ -201,6 +201,17 @@ def test_mimic():
         lw.load(one_joint("revolute", inside), mimic="independent")
 
 
+def test_mimic_as_a_coupling():
+    """follower = multiplier (leader - reference) + offset."""
+    mimic = (
+        '<mimic joint="knee"><multiplier>2</multiplier><offset>0.5</offset>'
+        "<reference>0.1</reference></mimic>"
+    )
+    twin = lw.load(PRESS).with_coupling("drive_mimic", {"drive": 1, "knee": -2}, offset=0.3)
+    model = lw.load(PRESS.replace("<dynamics>", f"{mimic}<dynamics>"), mimic="couple")
+    assert model.hash == twin.hash
+
+
 def test_what_is_ignored_is_counted_or_warned_of():
     with pytest.warns(lw.ModelWarning):
         model = lw.load(PRESS.replace("<plugin", "<damping>3</damping><plugin"))

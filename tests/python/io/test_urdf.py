@@ -163,9 +163,28 @@ def test_mimic_is_an_error_or_independent_with_a_warning(arm, complaint):
     assert ("warning", "slide", text) in notes(model)
     message = complaint(lw.load, arm)
     assert message == (
-        ":26: joint 'slide': mimics joint 'shoulder', and couplings are not supported; "
+        ":26: joint 'slide': mimics joint 'shoulder'; couple them with mimic=\"couple\", "
         'let it move on its own with mimic="independent", or remove <mimic>'
     )
+
+
+def test_mimic_as_a_coupling(arm, complaint):
+    text, axis = arm.read_text(), '<axis xyz="1 0 0"/>'
+    twin = lw.load(arm).with_coupling("slide_mimic", {"slide": 1, "shoulder": -2}, offset=0.1)
+    mimic = '<mimic joint="shoulder" multiplier="2" offset="0.1"/>'
+    arm.write_text(text.replace(axis, f"{axis}{mimic}"))
+    model = lw.load(arm, mimic="couple")
+    assert model.coupling_names == ["slide_mimic"]
+    assert model.hash == twin.hash
+    for wrong, said in {
+        mimic.replace("shoulder", "shoulde"): "mimics joint 'shoulde', which does not exist; ",
+        mimic.replace("shoulder", "slide"): "mimics itself; name another joint",
+        mimic.replace('"2"', '"0"'): "coupling 'slide_mimic': the factor of joint 'shoulder'",
+    }.items():
+        arm.write_text(text.replace(axis, f"{axis}{wrong}"))
+        message = complaint(lw.load, arm, mimic="couple")
+        assert message.startswith(":26: "), message
+        assert said in message, message
 
 
 def test_unknown_options_are_refused(arm, complaint):
@@ -232,3 +251,19 @@ def test_floating_joint(arm):
     assert model.joint_types[0] == "floating"
     a = lw.forward_dynamics(model, model.neutral_configuration(), np.zeros(7), np.zeros(7))
     np.testing.assert_allclose(a, [0, 0, -9.81, 0, 0, 0, 0], atol=1e-12)
+
+
+def test_a_link_with_two_parents_closes_a_loop(arm):
+    """It hangs on the joint with more to say, as it does at zero; the other one closes the loop."""
+    brace = (
+        '<joint name="brace" type="revolute"><parent link="base"/><child link="lower"/>'
+        '<origin xyz="0 0 1.1" rpy="0 0 1.5707963267948966"/><axis xyz="0 1 0"/></joint></robot>'
+    )
+    arm.write_text(arm.read_text().replace("</robot>", brace))
+    model = lw.load(arm)
+    assert (model.joint_names, model.loop_names) == (["shoulder", "slide"], ["brace"])
+    assert (model.loop_parent_link_names, model.loop_child_link_names) == (["base"], ["lower"])
+    assert lw.loop_gaps(model, [0.0, 0.0]) == pytest.approx(np.zeros((1, 2)), abs=1e-15)
+    (note,) = [note for note in model.notes if note.element == "brace"]
+    assert note.level == "info"
+    assert note.text == "closes a loop of joints 'brace', 'slide' and 'shoulder'"

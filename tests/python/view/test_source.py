@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
+from helpers.press_sdf import PRESS
 from linkwise import base
 from linkwise.io.urdf_visuals import read_appearance
 from linkwise.record.model import GROUP, read_model
@@ -196,3 +197,12 @@ def test_loads_of_another_machine_are_refused(urdf, tmp_path):
     held = run.load_model()
     again = lw.loads.split(lw.open_run(tmp_path / "run.zarr"), "force", held)
     assert again.identical(lw.loads.split(run, "force"))
+
+
+def test_a_machine_with_loops_is_shown_without_loads(tmp_path):
+    path = tmp_path / "press.sdf"
+    path.write_text(PRESS)
+    source = open_source(path, Options())
+    assert source.model.n_loops == 1
+    assert any("closed loops" in note for note in source.notes)
+    assert not static_loads(source.model, source.model.initial_configuration()).any()
