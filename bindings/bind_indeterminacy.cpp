@@ -40,8 +40,9 @@ void bind_indeterminacy(nb::module_& m) {
       .def_prop_ro(
           "mobility", [](const Found& f) { return f.all.mobility; },
           "Degrees of freedom that are left.")
-      .def_prop_ro("determinate", &determinate, nb::rv_policy::move,
-                   "(n_joints + n_loops, 6): whether a component of a joint load is determinate.")
+      .def_prop_ro(
+          "determinate", &determinate, nb::rv_policy::move,
+          "(n_joints + n_loops, 6) [bool]: whether a component of a joint load is determinate.")
       .def_prop_ro("self_stresses", &self_stresses, nb::rv_policy::move,
                    "(rows - rank, n_joints + n_loops, 6) [N, N m]: joint loads of forces that "
                    "cancel inside the\nloops; any multiple of them may be added to the loads.");

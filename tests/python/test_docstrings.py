@@ -11,7 +11,8 @@ import linkwise as lw
 
 STUB = ast.parse(Path(lw.__file__).with_name("_core.pyi").read_text(encoding="utf-8"))
 #: A shape, such as (..., nv) or (size,); units in brackets, such as [N, N m].
-SHAPE = re.compile(r"\((?:\.\.\.|\w+)(?:, ?\w+)*,?\)")
+SIZE = r"\w+(?: [+-] \w+)?"
+SHAPE = re.compile(rf"\((?:\.\.\.|{SIZE})(?:, ?{SIZE})*,?\)")
 UNITS = re.compile(r"\[(?!(?:[a-z]+\d{4}))[^\]]*[A-Za-z][^\]]*\]")
 #: Where the formula comes from: a key of references.bib.
 SOURCE = re.compile(r"\[[a-z]+\d{4}\b[^\]]*\]|docs/theory/\w+\.md")

@@ -67,7 +67,8 @@ def test_one_axis(seed):
     gap = lw.loop_gaps(two_links("revolute", axis=z), q)
     np.testing.assert_allclose(gap, [[np.linalg.norm(shift), tilt]], rtol=1e-10)
     gap = lw.loop_gaps(two_links("prismatic", axis=z), q)
-    np.testing.assert_allclose(gap, [[np.hypot(*shift[:2]), angle_of(rotation)]], rtol=1e-10)
+    beside = rotation.T @ [shift[0], shift[1], 0]  # across the axis as the child has it
+    np.testing.assert_allclose(gap, [[np.hypot(*beside[:2]), angle_of(rotation)]], rtol=1e-10)
     assert not lw.loop_gaps(two_links("floating"), q).any()
 
 
