@@ -55,6 +55,7 @@ GOOD = {
     "drives": lambda rng, model: {},
     "property": lambda rng, model: rng.choice(("damping", "armature", "lower_limit")),
     "quantity": lambda rng, model: rng.choice(("axial", "torque", "force")),
+    "factors": lambda rng, model: {rng.choice(model.joint_names): rng.gauss(0, 1)},
     "bytes": lambda rng, model: model.to_bytes(),
 }
 # Each function with its arguments: `*` those that are always given.
@@ -68,6 +69,7 @@ CALLS = {
     "joint_poses": "*q threads",
     "link_poses": "*q threads",
     "loop_gaps": "*q",
+    "indeterminacy": "*q:state",
     "mass_matrix": "*q threads",
     "body_jacobian": "*q *body threads",
     "frame_pose": "*q *frame:link threads",
@@ -95,6 +97,10 @@ METHODS = {
     "with_joint": "*joint damping:number armature:number lower:number upper:number "
     "gear_ratio:number motor_inertia:number stiffness:number friction:number effort:number",
     "with_joints": "*joints:drives",
+    "loop_labels": "*loop:index",
+    "with_rod": "*name:text *parent:link *child:link *length:number point:vector "
+    "child_point:vector",
+    "with_coupling": "*name:text *factors offset:number",
     "with_loop": "*name:text *type:kind *parent:link *child:link translation:vector rotation "
     "child_translation:vector child_rotation:rotation axis:vector pitch:number",
     "frame_placement": "*frame:link",
@@ -248,8 +254,8 @@ def _use(name, result):
 def _method(rng, model, wrong):
     name = rng.choice(sorted(METHODS))
     given, options = arguments(rng, model, METHODS[name], wrong)
-    if name == "with_payload":
-        options["mass"] = given.pop()
+    if name in ("with_payload", "with_rod"):
+        options["mass" if name == "with_payload" else "length"] = given.pop()
     return lambda: repr(getattr(model, name)(*given, **options))
 
 

@@ -59,7 +59,9 @@ def read_mjcf(
                 _add_loops(builder, mj_model, names, closing)
                 notes += closing.notes()
             elif mj_model.neq:
-                text = f"{mj_model.neq} equality constraints ignored: loops stay open"
+                count = mj_model.neq
+                text = f'{count} equality constraints ignored: loops stay open; equality="exact" '
+                text += "closes those of connect and weld"
                 notes.append(("warning", "equality", text))
         for level, element, text in notes:
             builder.add_note(level, element, text)

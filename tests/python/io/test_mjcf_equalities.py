@@ -85,7 +85,10 @@ def notes_of(text, **options):
 def test_left_out_unless_asked_for():
     model, notes = notes_of(MACHINE % CONNECTS["bodies"])
     assert model.n_loops == 0
-    assert notes == ["1 equality constraints ignored: loops stay open"]
+    assert notes == [
+        '1 equality constraints ignored: loops stay open; equality="exact" closes those of connect '
+        "and weld"
+    ]
 
 
 @pytest.mark.parametrize(
