@@ -115,6 +115,72 @@ def test_andrews_mass_matrix():
     )
 
 
+def test_andrews_starts_as_published():
+    """Accelerations and the forces of the pin of K2 and K3 of the test set for IVP solvers."""
+    found = benchmark("andrews")
+    model, tau = found.model, np.zeros(found.model.nv)
+    tau[model.v_slice("beta")] = found.drives["beta"]
+    tau[model.v_slice("gamma")] = found.drives["gamma"](0.0, found.q0[model.q_slice("gamma")], None)
+    acceleration = lw.forward_dynamics(model, found.q0, found.v0, tau)
+    wanted = {"beta": 14222.4439199541, "Theta": -10666.8329399658}
+    for joint in model.joint_names:
+        value = acceleration[model.v_slice(joint)][0]
+        assert value == pytest.approx(wanted.get(joint, 0.0), rel=1e-12, abs=1e-8)
+    loads = lw.joint_loads(model, found.q0, found.v0, tau)[model.n_joints :]
+    k3 = lw.link_poses(model, found.q0)[model.link_names.index("K3"), :3, :3]
+    force = k3 @ loads[model.loop_names.index("K2_K3"), :3]
+    np.testing.assert_allclose(np.abs(force[:2]), [98.5668703962411, 6.12268834425567], rtol=1e-11)
+    assert np.abs(loads[1:, :3]).max() < 1e-10
+
+
+def test_the_heads_of_the_stewart_platform_carry_it():
+    """The six heads' forces and moments on the platform are its mass times its acceleration."""
+    found = benchmark("stewart")
+    model, q, v = found.model, found.q0, found.v0
+    tau = np.random.default_rng(1).normal(scale=200, size=model.nv)
+    tau[model.v_slice("head_0")] = 0
+    result = lw.forward_dynamics(model, q, v, tau, full=True)
+    loads = {
+        name: load
+        for name, load in zip(
+            [*model.joint_names, *model.loop_names], result.joint_load, strict=True
+        )
+        if name.startswith("head")
+    }
+    assert len(loads) == 6
+    pose = lw.link_poses(model, q)[model.link_names.index("platform")]  # along the world's axes
+    np.testing.assert_allclose(pose[:3, :3], np.eye(3), atol=1e-15)
+    center = model.link_centers_of_mass[model.link_names.index("platform")]
+    points = {
+        name: place[1][:3, 3]
+        for name, place in zip(model.loop_names, model.loop_placements, strict=True)
+    }
+    points["head_0"] = np.zeros(3)
+    force = sum(load[:3] for load in loads.values())
+    moment = sum(
+        np.cross(points[name] - center, load[:3]) + load[3:] for name, load in loads.items()
+    )
+    moved = lw.frame_acceleration(model, q, v, result.acceleration, lw.Frame("platform", center))
+    np.testing.assert_allclose(force, 100 * (moved[:3] + np.array([0, 0, 9.81])), rtol=1e-11)
+    np.testing.assert_allclose(moment, [9, 9, 18] * moved[3:], rtol=1e-10, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "rank", "mobility"),
+    [
+        ("four_bars", 10, 4, 1),
+        ("andrews", 15, 6, 1),
+        ("bricard", 5, 4, 1),
+        ("slider_crank", 5, 2, 1),
+        ("stewart", 15, 15, 6),
+    ],
+)
+def test_ways_to_move(name, rows, rank, mobility):
+    found = benchmark(name)
+    held = lw.indeterminacy(found.model, found.q0)
+    assert (held.rows, held.rank, held.mobility) == (rows, rank, mobility)
+
+
 def test_andrews_spring_is_the_slope_of_its_energy():
     torque = benchmark("andrews").drives["gamma"]
     gamma, step = 0.455279819163070380, 1e-6
