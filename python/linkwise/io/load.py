@@ -54,8 +54,8 @@ def load(
         their links.
     mimic: mimic joints of URDF and SDF are refused ("error"), tied to the joint that they follow
         ("couple"), or they move "independent" of each other, with a warning note.
-    equality: an MJCF's connect and weld constraints are left out with a warning ("ignore"), or are
-        spherical and fixed joints that close loops ("exact").
+    equality: an MJCF's connect, weld and joint constraints are left out with a warning ("ignore"),
+        or are spherical and fixed joints that close loops, and couplings ("exact").
 
     Raises InputError, in one line that names file, line, element and remedy, for anything that
     cannot be read without guessing. What was ignored or assumed is in ``model.notes``; each note

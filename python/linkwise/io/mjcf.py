@@ -36,8 +36,9 @@ def read_mjcf(
 ) -> Model:
     """The model that an MJCF file describes.
 
-    gravity: m/s2; None takes the file's. equality: whether connect and weld constraints are joints
-    that close loops ("exact") or left out ("ignore"). xml: the text, where it is no file.
+    gravity: m/s2; None takes the file's. equality: whether connect, weld and joint constraints
+    are loop joints and couplings ("exact") or left out ("ignore"). xml: the text, where it is no
+    file.
 
     Raises InputError with MuJoCo's own words for what its compiler refuses, and when the optional
     package is missing. Contacts, tendons, other equality constraints, forces of actuators and what
@@ -55,13 +56,13 @@ def read_mjcf(
         with np.errstate(all="ignore"):  # the builder refuses what is no number, with its name
             _add_bodies(builder, mj_model, names, added)
             if equality == "exact":
-                closing = Equalities(mj_model, rotation, set(names.joint))
+                closing = Equalities(mj_model, rotation, names.joint)
                 _add_loops(builder, mj_model, names, closing)
                 notes += closing.notes()
             elif mj_model.neq:
                 count = mj_model.neq
                 text = f'{count} equality constraints ignored: loops stay open; equality="exact" '
-                text += "closes those of connect and weld"
+                text += "takes those of connect, weld and joint"
                 notes.append(("warning", "equality", text))
         for level, element, text in notes:
             builder.add_note(level, element, text)
@@ -215,6 +216,8 @@ def _add_loops(builder: ModelBuilder, mj_model: Any, names: Names, closing: Equa
             child_translation=closure.child_translation - _anchor(mj_model, child),
             child_rotation=closure.child_rotation,
         )
+    for name, factors, offset in closing.couplings:
+        builder.add_coupling(name, factors, offset=offset)
 
 
 def _enabled(mj_model: Any, flag: str) -> bool:

@@ -1,8 +1,10 @@
-"""Equality constraints of an MJCF that are joints: <connect> a spherical, <weld> a fixed one.
+"""Equality constraints of an MJCF: <connect> is a spherical joint, <weld> a fixed one, and <joint>
+a coupling, where it is linear.
 
 What MuJoCo's compiler keeps of them (MjModel.eq_data; checked against its residuals): a connect has
 its point in body 1 and in body 2; a weld has a point in body 2, the same point in body 1, and the
 rotation of body 2 against body 1. Between sites it has none of that: the sites are to meet.
+A joint has q1 = c0 + c1 q2 + ..., both counted from the pose that is drawn, as they are here.
 """
 
 from __future__ import annotations
@@ -35,9 +37,11 @@ class Closure:
 class Equalities:
     """The equality constraints of a compiled file."""
 
-    def __init__(self, mj_model: Any, rotation: Any, taken: set[str]) -> None:
-        """rotation: matrix of a quaternion; taken: names of joints."""
+    def __init__(self, mj_model: Any, rotation: Any, joints: list[str]) -> None:
+        """rotation: matrix of a quaternion; joints: their names."""
         self.closures: list[Closure] = []
+        self.couplings: list[tuple[str, dict[str, float], float]] = []
+        taken = set(joints)
         self._model, self._rotation = mj_model, rotation
         self._left_out: dict[str, int] = {}
         for index in range(mj_model.neq):
@@ -49,7 +53,10 @@ class Equalities:
             while name in taken:
                 name += "_"
             taken.add(name)
-            self.closures.append(self._closure(index, name))
+            if self._is(index, "JOINT"):
+                self.couplings.append((name, *self._coupling(index, joints)))
+            else:
+                self.closures.append(self._closure(index, name))
 
     def notes(self) -> Iterator[tuple[str, str, str]]:
         for reason, count in self._left_out.items():
@@ -58,6 +65,26 @@ class Equalities:
             kind = "connect" if closure.type == "spherical" else "weld"
             text = f"<{kind}> is made exact: a {closure.type} joint without give"
             yield "info", shorten(closure.name), text
+        for name, *_ in self.couplings:
+            yield "info", shorten(name), "<joint> is made exact: a coupling without give"
+
+    def _is(self, index: int, kind: str) -> bool:
+        import mujoco
+
+        return bool(self._model.eq_type[index] == int(getattr(mujoco.mjtEq, f"mjEQ_{kind}")))
+
+    def _coupled(self, index: int) -> list[int]:
+        """The one or two joints of a joint constraint."""
+        ends = (int(self._model.eq_obj1id[index]), int(self._model.eq_obj2id[index]))
+        return [joint for joint in ends if joint >= 0]
+
+    def _coupling(self, index: int, joints: list[str]) -> tuple[dict[str, float], float]:
+        """Factors by joint and offset."""
+        factors = [1.0, -float(self._model.eq_data[index][1])]
+        coupled = zip(self._coupled(index), factors, strict=False)
+        return {joints[k]: factor for k, factor in coupled if factor}, float(
+            self._model.eq_data[index][0]
+        )
 
     def _bodies(self, index: int) -> tuple[int, int]:
         ends = (int(self._model.eq_obj1id[index]), int(self._model.eq_obj2id[index]))
@@ -74,13 +101,14 @@ class Equalities:
         """Why a constraint is left out, or ""."""
         import mujoco
 
-        kinds = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
-        if self._model.eq_type[index] not in kinds:
-            return "they couple joints, tendons or flexes"
+        if not any(self._is(index, kind) for kind in ("CONNECT", "WELD", "JOINT")):
+            return "they couple tendons or flexes"
         if self._model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EQUALITY):
             return "the file switches them off"
         if not self._model.eq_active0[index]:
             return "not active"
+        if self._is(index, "JOINT"):
+            return self._reason_of_coupling(index)
         first, second = self._bodies(index)
         if (self._model.body_mocapid[[first, second]] >= 0).any():
             return "they hold a mocap body, which a program moves"
@@ -88,13 +116,21 @@ class Equalities:
             return "both of their bodies are one"
         return ""
 
-    def _closure(self, index: int, name: str) -> Closure:
+    def _reason_of_coupling(self, index: int) -> str:
         import mujoco
 
+        ends = self._coupled(index)
+        one_axis = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+        if any(self._model.jnt_type[joint] not in one_axis for joint in ends):
+            return "they couple joints of several degrees of freedom"
+        if len(ends) > 1 and self._model.eq_data[index][2:5].any():
+            return "they couple joints by a curve"
+        return ""
+
+    def _closure(self, index: int, name: str) -> Closure:
         model, none = self._model, np.eye(3)
         bodies = self._bodies(index)
-        connect = model.eq_type[index] == int(mujoco.mjtEq.mjEQ_CONNECT)
-        kind = "spherical" if connect else "fixed"
+        kind = "spherical" if self._is(index, "CONNECT") else "fixed"
         if self._between_sites(index):
             places = [
                 (np.array(model.site_pos[site]), self._rotation(model.site_quat[site]))

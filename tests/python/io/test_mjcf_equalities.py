@@ -5,6 +5,8 @@ import pytest
 
 import linkwise as lw
 from helpers.closing_frames import closing_frames
+from linkwise.io.mjcf import Names, rotation
+from linkwise.io.mjcf_equalities import Equalities
 from linkwise.io.mjcf_state import position_from_mujoco
 
 mujoco = pytest.importorskip("mujoco")
@@ -76,6 +78,25 @@ def test_weld_is_as_far_apart_as_in_mujoco(kind, seed):
     assert np.linalg.norm(residual[3:]) == pytest.approx(abs(np.sin(angle / 2)), abs=1e-10)
 
 
+@pytest.mark.parametrize(
+    "inside", ['joint1="b1" joint2="b2" polycoef="0.3 -2.5 0 0 0"', 'joint1="b1" polycoef="0.3"']
+)
+def test_a_joint_constraint_is_a_coupling(inside):
+    """Its sum is off by what MuJoCo's residual says, whose hinges count from their ref."""
+    text = (MACHINE % f'<joint name="e" {inside}/>').replace('name="b1"', 'name="b1" ref="20"')
+    mj_model = mujoco.MjModel.from_xml_string(text)
+    model = lw.load(text, equality="exact")
+    assert model.coupling_names == ["e"]
+    found = Equalities(mj_model, rotation, Names(mj_model).joint)
+    ((name, factors, offset),) = found.couplings
+    assert (name, len(factors)) == ("e", 2 if "joint2" in inside else 1)
+    for seed in range(3):
+        qpos, residual = random_pose(mj_model, seed)
+        q = position_from_mujoco(model, mj_model, qpos)
+        off = sum(factor * q[model.q_slice(joint)][0] for joint, factor in factors.items()) - offset
+        assert residual == pytest.approx([off], rel=1e-12)
+
+
 def notes_of(text, **options):
     with pytest.warns(lw.ModelWarning):
         model = lw.load(text, **options)
@@ -86,15 +107,15 @@ def test_left_out_unless_asked_for():
     model, notes = notes_of(MACHINE % CONNECTS["bodies"])
     assert model.n_loops == 0
     assert notes == [
-        '1 equality constraints ignored: loops stay open; equality="exact" closes those of connect '
-        "and weld"
+        '1 equality constraints ignored: loops stay open; equality="exact" takes those of connect, '
+        "weld and joint"
     ]
 
 
 @pytest.mark.parametrize(
     ("equality", "reason"),
     [
-        ('<joint joint1="b1" joint2="b2"/>', "they couple joints, tendons or flexes"),
+        ('<joint joint1="b1" joint2="b2" polycoef="0 1 2 0 0"/>', "they couple joints by a curve"),
         ('<connect body1="b" anchor="0 0 0" active="false"/>', "not active"),
     ],
 )
