@@ -345,3 +345,12 @@ def test_an_angle_that_is_wrapped_says_so(rotor):
     assert note["element"] == "drives['axle']"
     assert note["text"].startswith(f"the target {said}")
     lw.Motion(lw.Table(times, np.unwrap(wrapped.values[:, 0]), "cubic"))
+
+
+def test_what_is_said_of_many_drives_is_said_once():
+    chain = lw.scenes.chain(6)
+    drives = {name: lambda t, q, v: [0.1 * np.sin(t)] for name in chain.joint_names}
+    notes = lw.simulate(chain, duration=0.1, drives=drives).warnings
+    (said,) = [note for note in notes if "without breakpoints=" in note["text"]]
+    named = [f"drives[{name!r}]" for name in chain.joint_names[:3]]
+    assert said["element"] == ", ".join(named) + " and 3 more"

@@ -47,7 +47,9 @@ def near(name: object, known: Iterable[str], kind: str = "known") -> str:
     if not names:
         return "there are none"
     if isinstance(name, str) and len(name) <= 200:
-        matches = difflib.get_close_matches(name, names[:5000], n=1, cutoff=0.6)
+        letters = sorted(name)  # iyx is ixy rather than iyz
+        matches = [known for known in names[:5000] if sorted(known) == letters][:1]
+        matches = matches or difflib.get_close_matches(name, names[:5000], n=1, cutoff=0.6)
         if matches:
             return f"did you mean '{shorten(matches[0])}'?"
     listed = ", ".join(shorten(n) for n in names[:_SHOWN_NAMES])
@@ -61,10 +63,11 @@ def complaint(
     remedy: str,
     line: int | None = None,
 ) -> InputError:
-    """The error ``FILE:LINE: ELEMENT: PROBLEM; REMEDY``, ready to raise."""
+    """The error ``FILE:LINE: ELEMENT: PROBLEM; REMEDY``, ready to raise; the problem may hold its
+    remedy itself."""
     where = shorten(os.fspath(source), 400) + (f":{line}" if line else "")
     parts = [p for p in (where, element) if p]
-    return InputError(f"{': '.join(parts)}: {problem}; {remedy}")
+    return InputError(f"{': '.join(parts)}: {problem}" + (f"; {remedy}" if remedy else ""))
 
 
 def complain(

@@ -250,6 +250,11 @@ def _run_in_frame(
     _checked(machine, frame, fixed_in)
     names = list(machine.joint_names) if joint is None else _names(joint)
     at = _as_point(point, len(names))
+    known = dict.fromkeys([*machine.joint_names, *(name for name, _, _ in machine.welds)])
+    for name in names:
+        if name not in known:
+            hint = near(name, known, "the joints are")
+            raise InputError(f"joint {shown(name)} does not exist; {hint}")
     found = _of_run(run, machine, names)
     q = rows(run, "position", slice(None))
     moved, attrs = _in_frame(machine, q, found, frame, at, fixed_in)

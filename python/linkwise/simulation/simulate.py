@@ -133,7 +133,22 @@ def set_driven(
         except InputError as error:
             raise InputError(f"wrenches[{name!r}]: {error}") from None
         notes += [Ignored("", f"wrenches[{name!r}]", note) for note in wrench.notes(end)]
-    return notes
+    return _each_once(notes)
+
+
+_MOST_NAMED = 3  # drives of which the same is said
+
+
+def _each_once(notes: list[Ignored]) -> list[Ignored]:
+    """What is said of several drives or wrenches, in one note."""
+    elements: dict[str, list[str]] = {}
+    for note in notes:
+        elements.setdefault(note.text, []).append(note.element)
+    found = []
+    for text, names in elements.items():
+        more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+        found.append(Ignored("", ", ".join(names[:_MOST_NAMED]) + more, text))
+    return found
 
 
 def driven_attrs(drives: Mapping[str, Drive], wrenches: Mapping[str, Wrench]) -> dict[str, str]:

@@ -167,10 +167,11 @@ def test_wrong_input(linkwise, run, tmp_path, arguments, complaint):
             lambda t: np.maximum(t - 0.2, 0) ** 2,
             r"the acceleration jumps by about 2 near t = 0\.2 s",
         ),
+        (lambda t: (40 * t) % (2 * np.pi), r"jumps by one turn .* as numpy\.unwrap does$"),
         (lambda t: 4 * t**3 + 1.2, r"leaves the joint's limits -1\.5 \.\. 1\.5 at t = 0\.\d+ s"),
         (lambda t: np.where(t < 0.4, t, np.nan), "elbow.csv"),
     ],
-    ids=["position", "velocity", "acceleration", "limits", "nan"],
+    ids=["position", "velocity", "acceleration", "turn", "limits", "nan"],
 )
 def test_motion_tables_that_cannot_be_followed(linkwise, scene, tmp_path, position, complaint):
     times = np.linspace(0, 0.5, 201)
@@ -274,6 +275,11 @@ def test_loads_at_a_link_of_joints_that_are_merged(linkwise, wrist, tmp_path):
     [
         (["-j", "flange"], "joint 'flange': is fixed and its links are merged; add --at child"),
         (["--at", "tp"], "did you mean 'tip'?"),
+        (
+            ["--at", "tip", "-j", "wrong"],
+            "the joints are: wrist, flange, end",
+        ),
+        (["--at", "tip", "-j", "flang"], "'flang' does not exist; did you mean 'flange'?"),
         (["--at", "tip", "--split", "force"], "--at: goes with --point"),
         (["--point", "1", "0", "0"], "--at: goes with --point"),
         (["--at", "world", "--point", "1", "0", "0"], "link 'world' does not exist"),

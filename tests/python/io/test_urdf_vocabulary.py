@@ -92,6 +92,7 @@ def test_damping_written_as_an_element_damps(tmp_path):
             "attribute 'spring_stiffness' of <dynamics>",
         ),
         ("damping=", "dampng=", "did you mean 'damping'"),
+        ('ixy="0"', 'ixy="0" iyx="0"', "did you mean 'ixy'"),
         ('rpy="0 0.2 0"', 'rot="1 0 0 0"', "attribute 'rot' of <origin>"),
         ('<mass value="20"/>', '<mass value="20" units="g"/>', "'units' of <mass>"),
         ('iyz="0"', 'iyz="0" izy="1"', "'izy' of <inertia>"),
