@@ -9,7 +9,7 @@ import numpy as np
 
 from linkwise.base import AnyArray
 from linkwise.record.provenance import plain
-from linkwise.record.schema import TIME_ATTRS, Schema
+from linkwise.record.schema import TIME_ATTRS, Coordinate, Schema
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,10 +43,6 @@ class MemoryRecord:
         self._attrs.update(attrs)
         count = sum(times.size for times in self._times)
         time = np.concatenate(self._times) if self._times else np.zeros(0)
-        coordinates = {
-            name: (coordinate.dims, coordinate.values, dict(coordinate.attrs))
-            for name, coordinate in self._schema.coordinates.items()
-        }
         data = {}
         for variable in self._schema.variables:
             values = np.empty((count, *variable.shape), dtype=variable.dtype)
@@ -61,6 +57,33 @@ class MemoryRecord:
         }
         return xr.Dataset(
             data,
-            coords={"time": ("time", time, dict(TIME_ATTRS)), **coordinates},
+            coords=_coordinates(time, self._schema.coordinates),
             attrs={name: plain(value) for name, value in self._attrs.items()},
         )
+
+
+# Of labels that most runs share, such as fx ... tz. An index takes as long to make as 4 variables.
+_indexed: dict[str, tuple[AnyArray, xr.Coordinates]] = {}
+
+
+def _coordinates(time: AnyArray, given: Mapping[str, Coordinate]) -> xr.Coordinates:
+    import xarray as xr
+
+    own: dict[str, Any] = {"time": ("time", time, dict(TIME_ATTRS))}
+    shared = {}
+    for name, coordinate in given.items():
+        values = coordinate.values
+        if name in ("joint", "dof", "coordinate") or (name,) != coordinate.dims or coordinate.attrs:
+            own[name] = (coordinate.dims, values, dict(coordinate.attrs))
+            continue
+        known = _indexed.get(name)
+        if known is None or not np.array_equal(known[0], values):
+            known = _indexed[name] = (values, xr.Coordinates({name: (coordinate.dims, values)}))
+        shared[name] = known[1]
+    made = xr.Coordinates(own)
+    variables, indexes = dict(made.variables), dict(made.xindexes)
+    for name, one in shared.items():
+        variables[name] = one.variables[name].copy(deep=False)
+        indexes[name] = one.xindexes[name]
+    ordered = {name: variables[name] for name in ("time", *given)}
+    return xr.Coordinates(ordered, indexes=indexes)

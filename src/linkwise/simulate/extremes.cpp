@@ -24,21 +24,48 @@ constexpr int deepest = 8;
 constexpr size_t steps_together = 32, halvings = 4;
 // Values that share one decision, so that most need no more than a comparison.
 constexpr size_t chunk = 64;
-constexpr size_t largest_block = size_t{1} << 20;  // numbers
+// Numbers per block, so that they stay in a cache; steps, so that they fill lanes.
+constexpr size_t largest_block = size_t{1} << 16, least_block = 8;
 
 /// How far a parabola rises over the higher of its ends, which are `apart`, where its middle rises
 /// over the middle of their chord by `bulge`.
-double rise(double bulge, double apart) {
-  if (!(4 * bulge > apart)) return 0;
-  const double part = 1 - apart / (4 * bulge);
-  return bulge * part * part;
+inline double rise(double bulge, double apart) {
+  const double part = 1 - apart / (4 * bulge), over = bulge * part * part;
+  return 4 * bulge > apart ? over : 0.0;
+}
+
+/// How far parabolas through a third value c bulge up and down between a and b, where that is more;
+/// `left`, `right`: factors of the differences to it.
+void widen(const double* __restrict a, const double* __restrict b, const double* __restrict c,
+           double left, double right, size_t n, double* __restrict up, double* __restrict down) {
+  for (size_t i = 0; i < n; ++i) {
+    const double bulge = right * (b[i] - c[i]) - left * (a[i] - c[i]);
+    up[i] = up[i] < bulge ? bulge : up[i];
+    down[i] = down[i] < -bulge ? -bulge : down[i];
+  }
+}
+
+/// Bulges become the values that are reached. Marks those beyond the extremes; whether any is.
+bool reach_out(const double* __restrict a, const double* __restrict b,
+               const double* __restrict least, const double* __restrict largest, size_t n,
+               double* __restrict up, double* __restrict down, std::int64_t* __restrict beyond) {
+  std::int64_t any = 0;
+  for (size_t i = 0; i < n; ++i) {
+    const double high = a[i] > b[i] ? a[i] : b[i], low = a[i] < b[i] ? a[i] : b[i];
+    up[i] = high + rise(up[i], high - low);
+    down[i] = low - rise(down[i], high - low);
+    beyond[i] = std::int64_t{up[i] > largest[i]} | std::int64_t{down[i] < least[i]};
+    any |= beyond[i];
+  }
+  return any != 0;
 }
 
 double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-double length(const double* a) {
+LW_INLINE double length(const double* a) {
   const double square = dot(a, a);
-  if (square > 1e-200 && square < 1e200) return std::sqrt(square);
+  if (square > 1e-200 && square < 1e200) [[likely]]
+    return std::sqrt(square);
   return std::hypot(a[0], a[1], a[2]);  // where squares overflow or vanish
 }
 
@@ -84,9 +111,9 @@ Extremes::Extremes(const Setup& setup, const double* constant, std::span<const d
       margin_(width_) {
   if (setup.any_given()) inverse_ = std::make_shared<BatchEvaluator>(*model_);
   // Functions of the caller's are asked while the step is the last one.
-  block_ = setup.calls_functions()
-               ? 1
-               : std::clamp(largest_block / std::max<size_t>(width_, 1), size_t{1}, steps_together);
+  block_ = setup.calls_functions() ? 1
+                                   : std::clamp(largest_block / std::max<size_t>(width_, 1),
+                                                least_block, steps_together);
 }
 
 void Extremes::begin(double t, const double* q, const double* v) {
@@ -225,26 +252,43 @@ void Extremes::write_values(size_t at, const double* loads, const double* drive)
   std::copy_n(drive, nv, out);
 }
 
-void Extremes::keep(size_t at) {
+/// Takes what goes beyond the extremes; of several rows the one that goes farthest, and the first
+/// of equals.
+void Extremes::keep(std::span<const size_t> rows) {
   const size_t nj = joints(*model_), derived = n_derived * nj;
-  const double* values = row(points_.values, at, width_);
-  const auto take = [&](Extreme& extreme, size_t c) {
+  const auto take = [&](Extreme& extreme, size_t c, size_t at) {
+    const double* values = row(points_.values, at, width_);
     extreme.value[c] = values[c];
     extreme.time[c] = points_.t[at];
     if (c < derived) std::copy_n(values + derived + 6 * (c % nj), 6, row(extreme.wrench, c, 6));
   };
+  constexpr std::int64_t none = -1;
   for_chunks([&](size_t begin, size_t end) {
-    std::int64_t any = 0;
-    for (size_t c = begin; c < end; ++c) {
-      any |= std::int64_t{values[c] < least_.value[c]};
-      any |= std::int64_t{values[c] > largest_.value[c]};
-    }
-    for (size_t c = begin; c < end && any; ++c) {
-      if (values[c] < least_.value[c]) take(least_, c);
-      if (values[c] > largest_.value[c]) {
-        take(largest_, c);
-        if (c < derived) keep_state(c, values + derived + 6 * nj);
+    double low[chunk], high[chunk];
+    std::int64_t lowest[chunk], highest[chunk];
+    const size_t n = end - begin;
+    std::copy_n(least_.value.data() + begin, n, low);
+    std::copy_n(largest_.value.data() + begin, n, high);
+    std::fill_n(lowest, n, none);
+    std::fill_n(highest, n, none);
+    for (const size_t at : rows) {
+      const double* values = row(points_.values, at, width_) + begin;
+      const auto own = static_cast<std::int64_t>(at);
+      for (size_t i = 0; i < n; ++i) {
+        const double value = values[i];
+        lowest[i] = value < low[i] ? own : lowest[i];
+        low[i] = value < low[i] ? value : low[i];
+        highest[i] = value > high[i] ? own : highest[i];
+        high[i] = value > high[i] ? value : high[i];
       }
+    }
+    for (size_t i = 0; i < n; ++i) {
+      const size_t c = begin + i;
+      if (lowest[i] != none) take(least_, c, static_cast<size_t>(lowest[i]));
+      if (highest[i] == none) continue;
+      const auto at = static_cast<size_t>(highest[i]);
+      take(largest_, c, at);
+      if (c < derived) keep_state(c, row(points_.values, at, width_) + derived + 6 * nj);
     }
   });
 }
@@ -288,25 +332,19 @@ void Extremes::find_near(size_t left, size_t right, std::span<const size_t> neig
   const double* b = row(points_.values, right, width_);
   near_.clear();
   for_chunks([&](size_t begin, size_t end) {
-    double bulges[2][chunk] = {};  // upward, downward
-    for (const size_t n : neighbours) {
-      const double* c = row(points_.values, n, width_);
-      const Bend bend = bend_of(left, right, n);
-      for (size_t i = begin; i < end; ++i) {
-        const double bulge = trust * (bend.b * (b[i] - c[i]) - bend.a * (a[i] - c[i]));
-        double &up = bulges[0][i - begin], &down = bulges[1][i - begin];
-        up = up < bulge ? bulge : up;
-        down = down < -bulge ? -bulge : down;
-      }
+    const size_t n = end - begin;
+    double up[chunk] = {}, down[chunk] = {};
+    for (const size_t other : neighbours) {
+      const Bend bend = bend_of(left, right, other);
+      widen(a + begin, b + begin, row(points_.values, other, width_) + begin, trust * bend.a,
+            trust * bend.b, n, up, down);
     }
-    std::int64_t any = 0;
-    for (size_t i = begin; i < end; ++i) {
-      const double high = a[i] > b[i] ? a[i] : b[i], low = a[i] < b[i] ? a[i] : b[i];
-      any |= std::int64_t{high + bulges[0][i - begin] > largest_.value[i]};
-      any |= std::int64_t{low - bulges[1][i - begin] < least_.value[i]};
-    }
-    for (size_t i = begin; i < end && any; ++i)
-      add_near(i, a[i], b[i], bulges[0][i - begin], bulges[1][i - begin]);
+    std::int64_t beyond[chunk];
+    if (!reach_out(a + begin, b + begin, least_.value.data() + begin, largest_.value.data() + begin,
+                   n, up, down, beyond))
+      return;
+    for (size_t k = 0; k < n; ++k)
+      if (beyond[k]) near_.push_back({begin + k, up[k], down[k]});
   });
 }
 
@@ -364,7 +402,7 @@ void Extremes::digest(bool all) {
   std::vector<size_t> rows;
   for (size_t k = seen_; k < ends_.size(); ++k) rows.push_back(ends_[k].row);
   evaluate(rows);
-  for (const size_t at : rows) keep(at);
+  keep(rows);
   seen_ = ends_.size();
   measure();
   std::vector<Interval> open;
@@ -400,7 +438,7 @@ void Extremes::search_inside(std::vector<Interval> open) {
     std::vector<size_t> rows;
     for (const Interval& interval : open) rows.push_back(interval.middle);
     evaluate(rows);
-    for (const size_t at : rows) keep(at);
+    keep(rows);
     measure();
     left_to_do -= std::min(left_to_do, open.size());
     std::vector<Interval> next;
@@ -445,24 +483,25 @@ void Extremes::forget() {
   seen_ = kept;
 }
 
-std::vector<double> Extremes::found() const {
-  Extremes whole = *this;
-  whole.digest(true);
+void Extremes::trim() { points_.values.resize(points_.t.size() * width_); }
+
+std::vector<double> Extremes::found() && {
+  digest(true);
   std::vector<double> out;
   out.reserve(size(*model_));
-  for (Extreme* extreme : {&whole.least_, &whole.largest_}) {
+  for (Extreme* extreme : {&least_, &largest_}) {
     for (size_t c = 0; c < width_; ++c) {
       const double value = extreme->value[c];
       double& reach = extreme->reach[c];
-      reach = extreme == &whole.least_ ? std::min(reach, value) : std::max(reach, value);
+      reach = extreme == &least_ ? std::min(reach, value) : std::max(reach, value);
       if (!std::isfinite(value)) extreme->value[c] = reach = nan;
     }
     for (const auto* part : {&extreme->value, &extreme->time, &extreme->reach})
       out.insert(out.end(), part->begin(), part->end());
   }
-  for (const Extreme* extreme : {&whole.least_, &whole.largest_})
+  for (const Extreme* extreme : {&least_, &largest_})
     out.insert(out.end(), extreme->wrench.begin(), extreme->wrench.end());
-  out.insert(out.end(), whole.states_.begin(), whole.states_.end());
+  out.insert(out.end(), states_.begin(), states_.end());
   return out;
 }
 

@@ -34,8 +34,10 @@ class Extremes {
   /// Until where steps were added.
   double time() const { return time_; }
 
-  /// What was found until time(): see size().
-  std::vector<double> found() const;
+  /// Before a copy is made: drops what it does not need.
+  void trim();
+  /// What was found until time(), see size(); the last thing asked.
+  std::vector<double> found() &&;
   /// Per value, in the order [derived][joint], [joint][6], [nq], [nv] of velocities, accelerations
   /// and drive torques: the minimum, its time, a bound on what it may have been between looks, and
   /// the same of the maximum, as six rows. Then the whole load at the minimum and at the maximum
@@ -100,7 +102,7 @@ class Extremes {
   size_t append_middle(size_t left, size_t right);
   void evaluate(std::span<const size_t> rows);
   void write_values(size_t row, const double* loads, const double* drive);
-  void keep(size_t row);
+  void keep(std::span<const size_t> rows);
   void keep_state(size_t value, const double* motion);
   void measure();
   void digest(bool all);

@@ -438,8 +438,22 @@ void Simulation::interpolate(double t) {
   impose(t, y_.data());
 }
 
+/// A method of order p resolves the motion up to the power p of time. Of given motions, which are
+/// not integrated, it says nothing: there steps are halved until that changes nothing. Functions of
+/// the caller's may cost more than all the rest: there the quadrature alone is as good.
 void Simulation::add_work_of_step() {
-  work_->add_step(integrator_->time(), nodes_of_work(),
+  // Far below what integration to usual tolerances leaves, so that it does not show which members
+  // share their steps.
+  constexpr double fine = 1e-12;
+  const bool fixed_step = find_integrator(setup_->options.integrator).fixed_step;
+  const int order = statistics().last_order;
+  int nodes = setup_->calls_functions() ? order / 2 + 2 : order + 2;
+  double tolerance = 0;
+  if (setup_->any_motion()) {
+    tolerance = fine;
+    if (!fixed_step) nodes = WorkIntegral::most_nodes;
+  }
+  work_->add_step(integrator_->time(), nodes, tolerance,
                   [this](double t, double* out) { powers(t, out); });
 }
 
@@ -466,22 +480,13 @@ void Simulation::add_step(size_t member, double t, bool breaks, Extremes& to) co
 }
 
 std::vector<double> Simulation::extremes(size_t member) {
+  extremes_[member].trim();
   Extremes whole = extremes_[member];
   if (advanced_to_ > extremes_until_ && endings_[member].ok()) {
     interpolate_step(advanced_to_);
     add_step(member, advanced_to_, false, whole);
   }
-  return whole.found();
-}
-
-/// A method of order p resolves the motion up to the power p of time; of given motions, which are
-/// not integrated, it says nothing: 0. A fixed step is the user's, who knows them. Functions of the
-/// caller's may cost more than all the rest: there the quadrature alone is as good.
-int Simulation::nodes_of_work() const {
-  const bool fixed_step = find_integrator(setup_->options.integrator).fixed_step;
-  if (setup_->any_motion() && !fixed_step) return 0;
-  const int order = statistics().last_order;
-  return setup_->calls_functions() ? order / 2 + 2 : order + 2;
+  return std::move(whole).found();
 }
 
 /// What holds joints of given motion follows from the accelerations of the others.

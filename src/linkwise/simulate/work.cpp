@@ -12,8 +12,6 @@
 namespace linkwise {
 namespace {
 
-/// Against the largest power in a step: far below what integration to usual tolerances leaves.
-constexpr double halving_tolerance = 1e-12;
 /// A kink in the powers, where a motion is put together from pieces, is closed in until what is
 /// missed no longer counts.
 constexpr int most_halvings = 24;
@@ -94,16 +92,17 @@ WorkIntegral::WorkIntegral(const Model& model, size_t members, double t0)
       at_end_(members * width_),
       until_(members * width_) {}
 
-void WorkIntegral::add_step(double t, int nodes, const Powers& powers) {
+void WorkIntegral::add_step(double t, int nodes, double tolerance, const Powers& powers) {
   begin_ = end_;
   end_ = t;
-  nodes_ = std::clamp(nodes > 0 ? nodes : most_nodes, 1, most_nodes);
+  nodes_ = std::clamp(nodes, 1, most_nodes);
+  tolerance_ = tolerance;
   pieces_.clear();
   Piece whole = piece(begin_, end_, powers);
-  if (nodes > 0)
-    pieces_.push_back(std::move(whole));
-  else
+  if (tolerance > 0)
     halve(std::move(whole), most_halvings, powers);
+  else
+    pieces_.push_back(std::move(whole));
   for (Piece& part : pieces_) {
     part.at_begin = at_end_;
     add(part, 1, at_end_);
@@ -142,7 +141,7 @@ bool WorkIntegral::adds_up(const Piece& whole, const Piece& left, const Piece& r
   double largest = 0;
   for (const double power : whole.powers) largest = std::max(largest, std::abs(power));
   for (size_t i = 0; i < n; ++i)
-    if (std::abs(one[i] - two[i]) > halving_tolerance * (end_ - begin_) * largest) return false;
+    if (std::abs(one[i] - two[i]) > tolerance_ * (end_ - begin_) * largest) return false;
   return true;
 }
 

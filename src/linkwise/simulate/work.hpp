@@ -25,8 +25,9 @@ class WorkIntegral {
   WorkIntegral(const Model& model, size_t members, double t0);
 
   /// The last step ended at t. nodes: quadrature is exact for powers of degree 2 nodes - 1 in time,
-  /// works within the step for those of degree nodes - 1; 0: the step is halved where it must be.
-  void add_step(double t, int nodes, const Powers& powers);
+  /// works within the step for those of degree nodes - 1. tolerance: halves of the step agree with
+  /// the whole to that share of the largest work, or are halved again; 0: the step stays whole.
+  void add_step(double t, int nodes, double tolerance, const Powers& powers);
   /// Works until t within the last step.
   void reach(double t);
 
@@ -45,8 +46,9 @@ class WorkIntegral {
   void add(const Piece& piece, double fraction, std::vector<double>& works) const;
 
   size_t width_;
-  double begin_, end_;                  ///< of the last step
-  int nodes_ = 0;                       ///< per piece of it
+  double begin_, end_;  ///< of the last step
+  int nodes_ = 0;       ///< per piece of it
+  double tolerance_ = 0;
   std::vector<Piece> pieces_;           ///< of it, in order
   std::vector<double> at_end_, until_;  ///< works at its end, and at the time asked for last
 };

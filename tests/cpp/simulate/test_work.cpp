@@ -19,8 +19,8 @@ TEST(WorkIntegral, IsExactForPolynomials) {
     };
     const auto exact = [](double t, int degree) { return std::pow(t, degree + 1) / (degree + 1); };
     WorkIntegral work(*model, 1, 0);
-    work.add_step(0.5, nodes, powers);
-    work.add_step(2, nodes, powers);
+    work.add_step(0.5, nodes, 0, powers);
+    work.add_step(2, nodes, 0, powers);
     work.reach(1.25);
     EXPECT_NEAR(work.of(0)[1], exact(1.25, part), 1e-12 * exact(2, part)) << nodes;
     EXPECT_NEAR(work.of(0)[2], 1.25, 1e-14);
@@ -37,13 +37,27 @@ TEST(WorkIntegral, DoesNotDependOnTheTimesAskedFor) {
   };
   WorkIntegral once(*model, 1, 0), often(*model, 1, 0);
   for (int step = 1; step <= 5; ++step) {
-    once.add_step(step, 5, powers);
-    often.add_step(step, 5, powers);
+    once.add_step(step, 5, 0, powers);
+    often.add_step(step, 5, 0, powers);
     for (double t = step - 0.9; t < step; t += 0.1) often.reach(t);
   }
   once.reach(4.7);
   often.reach(4.7);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(once.of(0)[i], often.of(0)[i]);
+}
+
+TEST(WorkIntegral, HalvesStepsUntilTheyAddUp) {
+  const auto model = make_model(pendulum());
+  const auto powers = [](double t, double* out) {
+    for (int i = 0; i < 3; ++i) out[i] = (i + 1) * std::sin(60 * t);
+  };
+  for (const double tolerance : {1e-6, 1e-9, 1e-12}) {
+    WorkIntegral work(*model, 1, 0);
+    work.add_step(2, 3, tolerance, powers);
+    work.reach(2);
+    for (int i = 0; i < 3; ++i)
+      EXPECT_NEAR(work.of(0)[i], (i + 1) * (1 - std::cos(120.0)) / 60, 1e2 * tolerance);
+  }
 }
 
 }  // namespace

@@ -73,6 +73,25 @@ def test_what_holds_a_given_motion_does_work():
     assert np.all(held.drive_work == 0)
 
 
+@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "runge_kutta_4"])
+@pytest.mark.parametrize("step", [0.25, 0.01])
+def test_fixed_steps_may_be_longer_than_a_given_motion_swings(integrator, step):
+    """The work is what the energy gained, at every sample that ends a step."""
+    rate = 40.0
+
+    def swing(t):
+        a = 0.5 * rate * t
+        return 0.5 * np.sin(a), 0.25 * rate * np.cos(a), -0.125 * rate**2 * np.sin(a)
+
+    drives = {"pivot": lw.Motion(swing, breakpoints=())}
+    options = {"integrator": integrator, "step": step}
+    run = lw.simulate(pendulum(), duration=1.0, every=0.25, drives=drives, **options)
+    energy = run.kinetic_energy + run.potential_energy
+    gained = (energy - energy[0]).values
+    assert np.abs(gained).max() > 1
+    np.testing.assert_allclose(run.drive_work[:, 0], gained, atol=1e-7 * np.abs(gained).max())
+
+
 def test_work_of_a_wrench():
     wrench = lw.Wrench([6.0, 1.0, 2.0, 0, 0, 3.0])
     run = lw.simulate(slider(), times=[0, 1, 3], wrenches={"block": wrench}, tolerance=1e-10)
