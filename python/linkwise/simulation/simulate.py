@@ -215,21 +215,51 @@ def _record(
         # full.
         said = {"outcome": "error", "message": f"{type(error).__name__}: {error}"}
         with contextlib.suppress(Exception):
-            said |= warning_attrs([*_noticed(simulation), *ignored])
+            said |= warning_attrs([*_noticed(simulation, ignored), *ignored])
             record.finish(said, _extremes(simulation, schema))
         raise
     attrs = _attributes_at_end(simulation, clock.monotonic() - started)
     doubt = solver_doubt(simulation.statistics.solver_error)
     attrs["solver_error"] = "bounded" if doubt is None else "not bounded"
-    noticed = [*_noticed(simulation), *ignored, *([] if doubt is None else [doubt])]
+    noticed = [*_noticed(simulation, ignored), *ignored, *([] if doubt is None else [doubt])]
     finished = record.finish(attrs | warning_attrs(noticed), _extremes(simulation, schema))
     return Run(finished, record.path, model), ending
 
 
-def _noticed(simulation: Simulation) -> list[Ignored]:
+def _noticed(simulation: Simulation, ignored: Sequence[Ignored]) -> list[Ignored]:
     """What was noticed about stiffness and about forces of large gain, for the run's warnings."""
     said = {"integrator": simulation.stiffness, "forces": simulation.force_doubt}
+    if any(note.element == COARSE for note in ignored):
+        said.pop("integrator")  # short steps have another reason
     return [Ignored("", element, text) for element, text in said.items() if text]
+
+
+COARSE = "solver_tolerance"
+
+
+def _coarse_solver(simulation: Simulation, options: Mapping[str, Any]) -> list[Ignored]:
+    """What is said where the errors of an iterative solver are more than the error test bears.
+
+    From ten times the step tolerance on, steps get shorter: `docs/theory/simulate.md`.
+    """
+    kinds = {row["name"]: row["kind"] for row in _core.solvers()}
+    fixed = {row["name"] for row in _core.integrators() if row["fixed_step"]}
+    integrator = options.get("integrator", DEFAULTS["integrator"])
+    given = (options.get("solver_options") or {}).get("tolerance", options.get("solver_tolerance"))
+    bearable = 10 * simulation.step_tolerance
+    if given is None or not given > bearable or integrator in fixed:
+        return []
+    if kinds.get(simulation.solver) != "iterative":
+        return []
+    return [
+        Ignored(
+            "",
+            COARSE,
+            f"{given:g} is more than the error test of the steps bears: forces are wrong by as "
+            f"much, and steps get short because of it; give {bearable:.1g} at most, or leave it "
+            "out",
+        )
+    ]
 
 
 def _attributes_at_end(simulation: Simulation, wall_time: float) -> dict[str, Any]:
@@ -392,7 +422,7 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_name)
-    ignored = [*notes, *warnings_of(model)]
+    ignored = [*notes, *_coarse_solver(simulation, options), *warnings_of(model)]
     attrs |= warning_attrs(ignored)
     if output is None:
         _require_memory(schema, sampled.size)

@@ -84,3 +84,24 @@ def test_long_chains_that_rounding_keeps_from_the_bound_go_on():
     )
     direct = lw.simulate(model, duration=0.05, every=0.05, q0=np.full(48, 0.05), tolerance=1e-11)
     np.testing.assert_allclose(run.position[-1], direct.position[-1], atol=1e-8)
+
+
+def coarse_notes(**options):
+    options = {"method": "constraint_force", "solver": "conjugate_gradient"} | options
+    run = lw.simulate(lw.scenes.chain(4), duration=0.2, every=0.2, q0=np.full(4, 0.3), **options)
+    return {note["element"]: note["text"] for note in run.warnings}
+
+
+@pytest.mark.parametrize("integrator", ["auto", "adams"])
+def test_steps_that_are_short_for_the_solvers_errors_are_not_stiff(integrator):
+    said = coarse_notes(solver_tolerance=1e-3, integrator=integrator)
+    assert "integrator" not in said
+    assert "give 1e-06 at most, or leave it out" in said["solver_tolerance"]
+    assert "solver_tolerance" in coarse_notes(solver_options={"tolerance": 1e-3})
+
+
+def test_solvers_that_steps_bear_are_passed_over():
+    assert not coarse_notes()
+    assert not coarse_notes(solver_tolerance=1e-6)
+    assert not coarse_notes(solver="thomas", solver_tolerance=1e-3)
+    assert not coarse_notes(solver_tolerance=1e-3, integrator="runge_kutta_4", step=1e-3)
