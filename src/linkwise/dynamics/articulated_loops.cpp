@@ -231,7 +231,10 @@ void ArticulatedLoops::factor(int g) {
   }
   system.factor();
   report_.rows += group.rows;
-  report_.rank += system.rank();
+  if (system.rank() < 0 || report_.rank < 0)
+    report_.rank = -1;
+  else
+    report_.rank += system.rank();
   report_.smallest_pivot = std::min(report_.smallest_pivot, system.smallest_pivot());
 }
 
@@ -326,8 +329,9 @@ void ArticulatedLoops::store_loop_load(int l, const Force<double>& w, double* lo
   std::copy(user.begin(), user.end(), loads + 6 * l);
 }
 
-void ArticulatedLoops::store_loop_loads(const SweepInput<double>& in, double* loads) const {
-  std::vector<Force<double>> load(model_.n_loops());
+void ArticulatedLoops::store_loop_loads(const SweepInput<double>& in, double* loads) {
+  std::vector<Force<double>>& load = load_;
+  load.assign(model_.n_loops(), {});
   for (int g = 0; g < static_cast<int>(groups_.size()); ++g)
     add_to_load(g, work_[g].f.data(), load);
   for (int l = 0; l < model_.n_loops(); ++l) {

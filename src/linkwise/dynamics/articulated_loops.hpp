@@ -55,7 +55,7 @@ class ArticulatedLoops {
   void solve_forces(const SweepInput<double>& in, int g, bool with_loads);
   void add_known_wrenches(const SweepInput<double>& in);
   void add_to_load(int g, const double* f, std::vector<Force<double>>& load) const;
-  void store_loop_loads(const SweepInput<double>& in, double* loads) const;
+  void store_loop_loads(const SweepInput<double>& in, double* loads);
   void store_loop_load(int l, const Force<double>& w, double* loads) const;
 
   const Model& model_;
@@ -73,6 +73,7 @@ class ArticulatedLoops {
   std::vector<Stage> stages_;
   std::vector<Compliance<double>> compliance_a_, compliance_b_;  ///< by loop
   std::vector<std::vector<int>> terms_;  ///< by coupling: columns of its joints, -1: given motion
+  std::vector<Force<double>> load_;
   LoopReport report_;
 };
 

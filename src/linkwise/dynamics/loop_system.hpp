@@ -22,10 +22,9 @@ class LoopSystem {
   double* metric(size_t member) { return metric_[member].data(); }
   void factor();
 
-  int rank() const { return is_small() ? exact_.rank() : shifted_.rank(); }
-  double smallest_pivot() const {
-    return is_small() ? exact_.smallest_pivot() : shifted_.smallest_pivot();
-  }
+  /// Of a small Lambda; -1 and 1 of a large one, whose null vectors are not counted on the way.
+  int rank() const { return is_small() ? exact_.rank() : -1; }
+  double smallest_pivot() const { return is_small() ? exact_.smallest_pivot() : 1; }
   /// x <- Lambda^+ x. Returns by how much the constraints contradict each other, where D is 1.
   double solve(std::vector<double>& x);
   /// What a number asked of row i is where D is 1, or a bound of it.

@@ -40,8 +40,6 @@ void multiply(const Profile& profile, const double* A, const double* x, double* 
 
 void ShiftedFactor::factor(const Profile& profile, const std::vector<double>& A) {
   L_ = A;
-  rank_ = 0;
-  double most = 0, least = 0;
   for (int i = 0; i < profile.size(); ++i) {
     double* const row = profile.row(L_.data(), i);
     const int begin = profile.first(i);
@@ -54,14 +52,8 @@ void ShiftedFactor::factor(const Profile& profile, const std::vector<double>& A)
       pivot -= row[j] * row[j];
     }
     pivot = std::max(pivot, 0.1 * shift);  // rounding may eat the shift
-    if (pivot > 10 * shift) {
-      least = rank_ == 0 ? pivot : std::min(least, pivot);
-      most = std::max(most, pivot);
-      ++rank_;
-    }
     row[i] = std::sqrt(pivot);
   }
-  smallest_ = rank_ > 0 ? least / most : 1;
 }
 
 void ShiftedFactor::solve_once(const Profile& profile, double* x) const {
@@ -82,19 +74,19 @@ double ShiftedFactor::solve(const Profile& profile, const std::vector<double>& A
   const auto n = static_cast<size_t>(profile.size());
   given_.assign(b, b + n);
   std::fill_n(x, n, 0.0);
-  std::vector<double> product(n);
+  product_.resize(n);
   double missed = largest(given_);
   left_ = given_;
   for (int step = 0; step < most_steps && missed > 0; ++step) {
-    std::vector<double> more = left_;
-    solve_once(profile, more.data());
-    for (size_t i = 0; i < n; ++i) more[i] += x[i];
-    multiply(profile, A.data(), more.data(), product.data());
-    for (size_t i = 0; i < n; ++i) left_[i] = given_[i] - product[i];
+    more_ = left_;
+    solve_once(profile, more_.data());
+    for (size_t i = 0; i < n; ++i) more_[i] += x[i];
+    multiply(profile, A.data(), more_.data(), product_.data());
+    for (size_t i = 0; i < n; ++i) left_[i] = given_[i] - product_[i];
     const double now = largest(left_);
     if (!(now < missed)) break;  // rounding errors are all that is left
     missed = now;
-    std::copy(more.begin(), more.end(), x);
+    std::copy(more_.begin(), more_.end(), x);
   }
   return missed;
 }

@@ -30,23 +30,17 @@ void multiply(const Profile& profile, const double* A, const double* x, double* 
 /// Solutions of least length of A x = b, where A is positive semidefinite and its largest
 /// eigenvalues are about 1: A + mu 1 is factored, and x <- x + (A + mu 1)^-1 (b - A x) repeated. A
 /// step leaves of the error in the direction of an eigenvalue l the part mu / (l + mu), and nothing
-/// is added where l is zero.
+/// is added where l is zero. Which are zero it does not tell.
 class ShiftedFactor {
  public:
   void factor(const Profile& profile, const std::vector<double>& A);
-  /// Pivots that are not the shift alone.
-  int rank() const { return rank_; }
-  /// The last that counts over the largest.
-  double smallest_pivot() const { return smallest_; }
   /// x may be b. Returns the largest component of b - A x.
   double solve(const Profile& profile, const std::vector<double>& A, const double* b, double* x);
 
  private:
   void solve_once(const Profile& profile, double* x) const;
 
-  std::vector<double> L_, given_, left_;
-  int rank_ = 0;
-  double smallest_ = 1;
+  std::vector<double> L_, given_, left_, more_, product_;
 };
 
 }  // namespace linkwise
