@@ -442,6 +442,7 @@ void make_method(PyDynamicsMethod* self, const PyModel& model, const std::string
   options.solver_options.stop = stop_rule_from_name(stop);
   options.solver_options.max_iterations = max_iterations;
   set_options(options.solver_options, solver_option_values(solver_options));
+  refuse_loops(*model.model, "DynamicsMethod", "use forward_dynamics");
   new (self) PyDynamicsMethod(model, std::move(options));
 }
 

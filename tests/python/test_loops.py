@@ -256,6 +256,7 @@ def test_states_that_leave_a_loop_open_are_refused():
     [
         lambda m: lw.inverse_dynamics(m, np.zeros(3), None, None),
         lambda m: lw.mass_matrix(m, np.zeros(3)),
+        lambda m: lw.DynamicsMethod(m),
         lambda m: lw.joint_loads_by_cause(m, ["gravity"], np.zeros(3), None),
         *(
             lambda m, name=method["name"]: lw.forward_dynamics(m, np.zeros(3), None, method=name)
