@@ -30,6 +30,26 @@ void check_table(const ArrayIn& t, const ArrayIn& y, size_t columns) {
                        "; sort the table by time and remove repeated times");
 }
 
+/// The parabola through three samples, which is the not-a-knot spline of so few. SciPy solves for
+/// it and warns where the times are very uneven.
+void add_parabola(const double* t, const double* y, size_t columns, std::vector<double>& to) {
+  const double first = t[1] - t[0], second = t[2] - t[1];
+  std::vector<double> slopes[2], halves;
+  for (size_t c = 0; c < columns; ++c) {
+    const double before = (y[columns + c] - y[c]) / first;
+    const double after = (y[2 * columns + c] - y[columns + c]) / second;
+    halves.push_back((after - before) / (first + second));
+    slopes[0].push_back(before - halves[c] * first);
+    slopes[1].push_back(before + halves[c] * first);
+  }
+  for (size_t i = 0; i < 2; ++i) {
+    to.insert(to.end(), columns, 0.0);
+    to.insert(to.end(), halves.begin(), halves.end());
+    to.insert(to.end(), slopes[i].begin(), slopes[i].end());
+    to.insert(to.end(), y + i * columns, y + (i + 1) * columns);
+  }
+}
+
 /// Values over time as piecewise polynomials; cubic ones are SciPy's not-a-knot splines.
 Table make_table(nb::handle times, nb::handle values, const std::string& interpolation,
                  size_t columns) {
@@ -53,6 +73,10 @@ Table make_table(nb::handle times, nb::handle values, const std::string& interpo
   if (interpolation != "cubic")
     throw InputError("interpolation '" + interpolation + "' is unknown; known: linear, cubic");
   table.degree = 3;
+  if (n == 3) {
+    add_parabola(t.data(), y.data(), columns, table.coefficients);
+    return table;
+  }
   const nb::object rows = numpy("reshape")(y.object(), nb::make_tuple(n, columns));
   const nb::object spline = python_function("scipy.interpolate", "CubicSpline")(t.object(), rows);
   const ArrayIn c =

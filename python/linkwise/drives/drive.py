@@ -90,7 +90,7 @@ class Table:
             raise InputError(f"table times: reach {np.abs(times).max():g} s; give shorter times")
         check_one_of("table interpolation", self.interpolation, ("linear", "cubic"))
         spans = np.diff(times)
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             slopes = np.diff(values, axis=0).T / spans
             if self.interpolation == "cubic":
                 slopes = 12 * slopes / spans**2  # as large as any derivative of the spline
@@ -184,6 +184,8 @@ def _hand_over(
 ) -> None:
     """Give the core simulation a table, a function and what is known of it, or constants: it has a
     setter for each."""
+    if isinstance(value, Table) and value.times[-1] <= 0:
+        value = value.values[-1]  # nothing but its last row ever acts, at the start too
     if isinstance(value, Table):
         set_table = getattr(simulation, f"{setter}_table")
         set_table(name, value.times, value.values, interpolation=value.interpolation, **more)

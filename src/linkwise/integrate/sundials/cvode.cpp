@@ -44,6 +44,8 @@ class Cvode final : public Integrator {
  private:
   void attach_solvers(int method);
   void restart();
+  int start_with(double limit, double horizon, double& t);
+  bool moved_to(double t) const;  ///< whether the step there is more than round-off
   Outcome take_state(double t);
   void read_counters();
   Outcome classify(int flag) const;
@@ -230,15 +232,14 @@ Outcome Cvode::step(double t_limit) {
   const double reach = options_.max_step > 0.0 ? 10.0 * options_.max_step : 1.0;
   const double horizon = std::min(time_ + reach, limit);
   sunrealtype t = time_;
-  const int flag = CVode(memory_.get(), horizon, y_.get(), &t, CV_ONE_STEP);
+  int flag = CVode(memory_.get(), horizon, y_.get(), &t, CV_ONE_STEP);
+  if (flag >= 0 && counters_.steps == 0 && !moved_to(t)) flag = start_with(limit, horizon, t);
   if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
   interpolant_valid_ = false;
   if (flag < 0) return classify(flag);
   if (!all_finite({data(y_), size()})) return Outcome::not_finite;
   // CVODE goes on with steps that round-off swallows; nothing would ever end it.
-  if (!(t > time_ + 4.0 * std::numeric_limits<double>::epsilon() * std::abs(time_))) {
-    return no_smaller_step();
-  }
+  if (!moved_to(t)) return no_smaller_step();
   const auto state_at = [this](double at, double* y) {
     check(CVodeGetDky(memory_.get(), at, 0, scratch_.get()), "CVodeGetDky");
     std::copy_n(data(scratch_), size(), y);
@@ -255,6 +256,25 @@ Outcome Cvode::step(double t_limit) {
   read_counters();
   system_->accepted(time_, state_.data());
   return Outcome::converged;
+}
+
+/// CVODE lets its very first step change no value at rest by more than the absolute tolerance.
+/// After a blow late in time this is less than times differ by. A step that is told to it is tested
+/// as any other is.
+int Cvode::start_with(double limit, double horizon, double& t) {
+  restart();
+  check(CVodeSetStopTime(memory_.get(), std::min(limit, never)), "CVodeSetStopTime");
+  const double smallest = 4096 * std::numeric_limits<double>::epsilon() * std::abs(time_);
+  check(CVodeSetInitStep(memory_.get(), std::min(smallest, 0.1 * (horizon - time_))),
+        "CVodeSetInitStep");
+  t = time_;
+  const int flag = CVode(memory_.get(), horizon, y_.get(), &t, CV_ONE_STEP);
+  check(CVodeSetInitStep(memory_.get(), 0.0), "CVodeSetInitStep");
+  return flag;
+}
+
+bool Cvode::moved_to(double t) const {
+  return t > time_ + 4.0 * std::numeric_limits<double>::epsilon() * std::abs(time_);
 }
 
 /// What CVODE returned at time t, projected, into state_, unless it cannot be projected.
