@@ -137,9 +137,9 @@ void Sample::write(const Model& model, size_t member, const Instant* instant) co
   }
 }
 
-std::string_view Sample::not_finite(const Model& model, size_t member) const {
+std::string_view Sample::not_finite(const Model& model, size_t member, bool works_are_known) const {
   for (size_t k = 0; k < std::size(table); ++k) {
-    if (!values[k] || table[k].needs == Needs::works) continue;  // works may be unknown
+    if (!values[k] || (table[k].needs == Needs::works && !works_are_known)) continue;
     const size_t width = quantity_width(table[k], model);
     const double* row = values[k] + member * rows * width;
     if (!all_finite({row, width})) return table[k].name;

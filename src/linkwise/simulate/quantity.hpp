@@ -73,8 +73,9 @@ struct Sample {
   Sample at(const Model& model, size_t member, size_t row) const;
   /// One row of one member; NaN, or -1 where whole numbers are counted, where it has ended.
   void write(const Model& model, size_t member, const Instant* instant) const;
-  /// The first quantity in a member's row that is no number; empty where all are.
-  std::string_view not_finite(const Model& model, size_t member) const;
+  /// The first quantity in a member's row that is no number; empty where all are. Works that are
+  /// not known are NaN, and nothing is wrong with that.
+  std::string_view not_finite(const Model& model, size_t member, bool works_are_known) const;
 };
 
 }  // namespace linkwise

@@ -454,7 +454,7 @@ void Simulation::add_work_of_step() {
     if (!fixed_step) nodes = WorkIntegral::most_nodes;
   }
   work_->add_step(integrator_->time(), nodes, tolerance,
-                  [this](double t, double* out) { powers(t, out); });
+                  [this](double t, double* out) { return powers(t, out); });
 }
 
 /// The last step counts once it is reached as a whole.
@@ -489,8 +489,9 @@ std::vector<double> Simulation::extremes(size_t member) {
   return std::move(whole).found();
 }
 
-/// What holds joints of given motion follows from the accelerations of the others.
-void Simulation::powers(double t, double* out) {
+/// What holds joints of given motion follows from the accelerations of the others. False where
+/// these were not found.
+bool Simulation::powers(double t, double* out) {
   interpolate(t);
   const double* v = rates_in(y_.data());
   bool known = true;
@@ -513,7 +514,7 @@ void Simulation::powers(double t, double* out) {
   const size_t width = WorkIntegral::width(model());
   for (size_t i = 0; i < members_; ++i)
     write_powers(model(), *forces_, i, y_.data() + i * nq(), v + i * nv(), out + i * width);
-  if (!known) std::fill_n(out, members_ * width, std::numeric_limits<double>::quiet_NaN());
+  return known;
 }
 
 bool Simulation::write_sample(double t, const Sample& sample) {
@@ -550,7 +551,7 @@ bool Simulation::write_sample(double t, const Sample& sample) {
 /// Ends a member whose row holds what is no number: products of huge values overflow in loads and
 /// energies before states do.
 void Simulation::check_sample(double t, size_t member, const Sample& sample) {
-  const std::string_view wrong = sample.not_finite(model(), member);
+  const std::string_view wrong = sample.not_finite(model(), member, work_ && work_->known());
   if (wrong.empty()) {
     endings_[member].time = t;
     return;

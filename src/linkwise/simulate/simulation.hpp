@@ -144,7 +144,7 @@ class Simulation : private OdeSystem {
   void add_step_to_extremes();
   void interpolate_step(double t);
   void add_step(size_t member, double t, bool breaks, Extremes& to) const;
-  void powers(double t, double* out);
+  bool powers(double t, double* out);
   bool write_sample(double t, const Sample& sample);
   void check_sample(double t, size_t member, const Sample& sample);
   void add_holding_torques();

@@ -93,6 +93,7 @@ WorkIntegral::WorkIntegral(const Model& model, size_t members, double t0)
       until_(members * width_) {}
 
 void WorkIntegral::add_step(double t, int nodes, double tolerance, const Powers& powers) {
+  if (!known_) return;
   begin_ = end_;
   end_ = t;
   nodes_ = std::clamp(nodes, 1, most_nodes);
@@ -109,19 +110,19 @@ void WorkIntegral::add_step(double t, int nodes, double tolerance, const Powers&
   }
 }
 
-WorkIntegral::Piece WorkIntegral::piece(double begin, double end, const Powers& powers) const {
+WorkIntegral::Piece WorkIntegral::piece(double begin, double end, const Powers& powers) {
   Piece made{begin, end, std::vector<double>(nodes_ * at_end_.size()), {}};
   const Rule& rule = rule_of(nodes_);
-  for (int k = 0; k < nodes_; ++k)
-    powers(begin + (end - begin) * (1 + rule.nodes[k]) / 2,
-           made.powers.data() + k * at_end_.size());
+  for (int k = 0; k < nodes_ && known_; ++k)
+    known_ = powers(begin + (end - begin) * (1 + rule.nodes[k]) / 2,
+                    made.powers.data() + k * at_end_.size());
   return made;
 }
 
 void WorkIntegral::halve(Piece whole, int depth, const Powers& powers) {
   const double middle = whole.begin + (whole.end - whole.begin) / 2;
   Piece left = piece(whole.begin, middle, powers), right = piece(middle, whole.end, powers);
-  if (depth == 0 || pieces_.size() >= most_pieces || adds_up(whole, left, right)) {
+  if (!known_ || depth == 0 || pieces_.size() >= most_pieces || adds_up(whole, left, right)) {
     pieces_.push_back(std::move(left));
     pieces_.push_back(std::move(right));
     return;

@@ -17,7 +17,8 @@ namespace linkwise {
 class WorkIntegral {
  public:
   /// Writes the powers at a time within the last step [members][width], in the order of the works.
-  using Powers = std::function<void(double t, double* powers)>;
+  /// False: they are not known there, for what holds a given motion was not found.
+  using Powers = std::function<bool(double t, double* powers)>;
   static constexpr int most_nodes = 13;
 
   static size_t width(const Model& model) { return static_cast<size_t>(model.nv()) + 2; }
@@ -31,7 +32,12 @@ class WorkIntegral {
   /// Works until t within the last step.
   void reach(double t);
 
-  const double* of(size_t member) const { return until_.data() + member * width_; }
+  /// False for good after a step in which powers were not known.
+  bool known() const { return known_; }
+  /// Null where works are not known.
+  const double* of(size_t member) const {
+    return known_ ? until_.data() + member * width_ : nullptr;
+  }
 
  private:
   /// A part of the last step, with the works at its begin.
@@ -40,12 +46,13 @@ class WorkIntegral {
     std::vector<double> powers;  ///< by node
     std::vector<double> at_begin;
   };
-  Piece piece(double begin, double end, const Powers& powers) const;
+  Piece piece(double begin, double end, const Powers& powers);
   void halve(Piece whole, int depth, const Powers& powers);
   bool adds_up(const Piece& whole, const Piece& left, const Piece& right) const;
   void add(const Piece& piece, double fraction, std::vector<double>& works) const;
 
   size_t width_;
+  bool known_ = true;
   double begin_, end_;  ///< of the last step
   int nodes_ = 0;       ///< per piece of it
   double tolerance_ = 0;

@@ -173,3 +173,22 @@ def test_drive_energy_of_each_joint_is_its_work():
     exact = lw.loads.quantities(many).drive_energy.sel(joint="elbow")[-1]
     assert float(exact) != 0
     np.testing.assert_allclose(lw.loads.quantities(few).drive_energy[-1, 0], exact, rtol=1e-4)
+
+
+def test_a_work_that_is_no_number_ends_the_simulation():
+    """Steps too long for the damping: the power overflows before the state does."""
+    model = slider(damping=700.0)
+    run = lw.simulate(
+        model,
+        v0=[1e160],
+        duration=0.1,
+        every=0.001,
+        integrator="runge_kutta_4",
+        step=0.001,
+        record=["position", "velocity", "work"],
+        on_failure="return",
+    )
+    assert run.outcome == "not_finite"
+    assert "dissipated_energy is not finite" in run.message
+    for name in WORKS:
+        assert np.isfinite(run[name].values).all(), name
