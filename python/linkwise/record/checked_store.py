@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 import threading
 from collections.abc import AsyncIterator, Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import google_crc32c
+import numcodecs.zstd
 import zarr
 from zarr.core.buffer import default_buffer_prototype
 from zarr.storage import LocalStore
@@ -51,6 +54,28 @@ def is_chunk(key: str) -> bool:
     return "/c/" in key or key.endswith("/c")
 
 
+def _check_unlisted(folder: Path, key: str, data: bytes) -> None:
+    """InputError where a chunk that no list has fits neither its own checksum nor its array.
+
+    Zarr and Zstandard would say so too, without the file's name and when values are used.
+    """
+    name = key.removesuffix("/c").partition("/c/")[0]
+    try:
+        described = json.loads(plain_bytes(folder, f"{name}/zarr.json") or b"")
+        packed = [codec["name"] for codec in described["codecs"]]
+        body = data[:-4] if "crc32c" in packed else data
+        if body is not data and google_crc32c.value(body) != int.from_bytes(data[-4:], "little"):
+            raise ValueError("it does not fit its own checksum")
+        unpacked = len(numcodecs.zstd.decompress(body))
+        kind = described["data_type"]
+        if kind in ("float64", "int64"):
+            shape = described["chunk_grid"]["configuration"]["chunk_shape"]
+            if unpacked != 8 * math.prod(shape):
+                raise ValueError("it has another size than its array says")
+    except Exception as error:
+        raise damage(folder, key, f"is damaged ({reason(error)})") from None
+
+
 class CheckedStore(LocalStore):
     """A run's folder, read: each file is checked before anything is made of it.
 
@@ -88,6 +113,8 @@ class CheckedStore(LocalStore):
             size = _unpacked_bytes(data)
             if size is None or size > MOST_CHUNK_BYTES:
                 raise damage(self.root, key, "is not packed as linkwise packs chunks")
+            if self.checksums is None:
+                _check_unlisted(self.root, key, data)
         return data
 
     def _fits(self, key: str, data: bytes | None) -> bool:

@@ -365,6 +365,29 @@ def test_a_list_that_is_gone_is_said(copy):
         lw.open_run(copy)
 
 
+@pytest.mark.filterwarnings(QUIET)
+@pytest.mark.parametrize("old", [False, True])
+@pytest.mark.parametrize("damaged", ["bit", "end", "other array", "empty"])
+def test_chunks_without_a_list_are_checked_by_what_they_hold(copy, old, damaged):
+    """By Zarr's own checksum, by unpacking them, and by their size."""
+    make_old(copy) if old else (copy / LIST).unlink()
+    file = copy / "velocity" / "c" / "0" / "0"
+    data = bytearray(file.read_bytes())
+    if damaged == "bit":
+        data[len(data) // 2] ^= 16
+    elif damaged == "end":
+        data = data[:-3]
+    elif damaged == "other array":
+        data = (copy / "joint_load" / "c" / "0" / "0" / "0").read_bytes()
+    else:
+        data = b""
+    file.write_bytes(data)
+    run = lw.open_run(copy)
+    with pytest.raises(lw.InputError, match="velocity/c/0/0 is "):
+        _ = run.velocity.values
+    assert np.isfinite(run.position.values).all()
+
+
 def test_a_label_that_is_not_listed_is_said(copy):
     """A changed bit in the list may hide any array."""
     (copy / LIST).write_text((copy / LIST).read_text().replace("body/zarr.json", "body/zasr.json"))
