@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How often the stated bounds of peak loads hold, on a hundred machines.
+"""How often the stated bounds of peak loads hold, on a hundred and forty machines.
 
     python tools/bounds_coverage.py [--tolerances 1e-4 1e-5 1e-6] [--kind NAME] [--json FILE]
 
@@ -19,6 +19,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+from helpers import odd_scenes
 from helpers.bound_scenes import KINDS, coverage, robots
 
 
@@ -29,7 +30,7 @@ def main() -> int:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     warnings.simplefilter("ignore")  # of the robots' own files
-    kinds = {**KINDS, "robots": robots()}
+    kinds = {**KINDS, "robots": robots(), **odd_scenes.KINDS}
     found: list[dict[str, Any]] = []
     print("| scenes | " + " | ".join(f"{t:g}" for t in options.tolerances) + " | largest |")
     print("|---|" + "---|" * (len(options.tolerances) + 1))

@@ -67,9 +67,9 @@ def _random_tree(rng, floating):
     return {"model": model, "duration": 0.8, "q0": random_configuration(model, rng), "v0": v0}
 
 
-def _random_arm(rng, n, **properties):
+def random_arm(rng, n, gravity=DOWN, **properties):
     """n links end to end; properties of a joint may be functions of the generator."""
-    builder = lw.ModelBuilder("random arm", gravity=DOWN)
+    builder = lw.ModelBuilder("random arm", gravity=gravity)
     builder.add_link("base")
     parent = "base"
     for k in range(n):
@@ -91,7 +91,7 @@ def _random_arm(rng, n, **properties):
 
 
 def _stops(rng):
-    model = _random_arm(
+    model = random_arm(
         rng,
         int(rng.integers(1, 4)),
         lower=lambda r: -r.uniform(0.1, 0.6),
@@ -104,7 +104,7 @@ def _stops(rng):
 
 
 def _friction(rng):
-    model = _random_arm(
+    model = random_arm(
         rng,
         int(rng.integers(1, 4)),
         friction=lambda r: r.uniform(0.5, 5.0),
@@ -115,7 +115,7 @@ def _friction(rng):
 
 def _table(rng):
     """Short pulses that start late, ramps, and a blow on a link."""
-    model = _random_arm(rng, int(rng.integers(1, 4)), damping=0.2)
+    model = random_arm(rng, int(rng.integers(1, 4)), damping=0.2)
     start, width = rng.uniform(0.3, 0.6), 10 ** rng.uniform(-3.5, -1)
     corners = [0, start, start + 0.1 * width, start + width, start + 1.1 * width, 1.0]
     pulse = lw.Table(corners, rng.uniform(20, 80) * np.array([0, 0, 1, 1, 0, 0]))
@@ -131,7 +131,7 @@ def _table(rng):
 
 
 def _stiff_drives(rng):
-    model = _random_arm(rng, int(rng.integers(2, 5)))
+    model = random_arm(rng, int(rng.integers(2, 5)))
     drives = {
         name: lw.PD(10 ** rng.uniform(2, 5), 10 ** rng.uniform(0, 2), rng.uniform(-1, 1))
         for name in model.joint_names
@@ -140,7 +140,7 @@ def _stiff_drives(rng):
 
 
 def _given_motions(rng):
-    model = _random_arm(rng, int(rng.integers(2, 5)), damping=0.1)
+    model = random_arm(rng, int(rng.integers(2, 5)), damping=0.1)
     drives = {"joint0": lw.Motion(profile(rng.uniform(-1.5, 1.5), 1.0)), "joint1": lw.Locked()}
     return {"model": model, "duration": 1.0, "drives": drives}
 
@@ -152,7 +152,9 @@ def _robot(path, floating_base):
     return {"model": model, "duration": 0.5, "q0": q0, "v0": 0.3 * rng.standard_normal(model.nv)}
 
 
-def _drawn(kind, count, make):
+def drawn(kind, count, make):
+    """`count` scenes by name, each made of a generator of its own."""
+
     def scene(k):
         return lambda: make(np.random.default_rng([sum(kind.encode()), k]))
 
@@ -175,13 +177,13 @@ def robots():
 
 KINDS = {
     "known machines": _KNOWN,
-    "random trees": _drawn("tree", 25, functools.partial(_random_tree, floating=False)),
-    "floating trees": _drawn("floating", 10, functools.partial(_random_tree, floating=True)),
-    "stops, stiff ones too": _drawn("stops", 15, _stops),
-    "dry friction": _drawn("friction", 8, _friction),
-    "tables and blows": _drawn("table", 10, _table),
-    "stiff drives": _drawn("drives", 7, _stiff_drives),
-    "given motions": _drawn("motions", 5, _given_motions),
+    "random trees": drawn("tree", 25, functools.partial(_random_tree, floating=False)),
+    "floating trees": drawn("floating", 10, functools.partial(_random_tree, floating=True)),
+    "stops, stiff ones too": drawn("stops", 15, _stops),
+    "dry friction": drawn("friction", 8, _friction),
+    "tables and blows": drawn("table", 10, _table),
+    "stiff drives": drawn("drives", 7, _stiff_drives),
+    "given motions": drawn("motions", 5, _given_motions),
 }
 SCENES = {name: scene for scenes in KINDS.values() for name, scene in scenes.items()}
 
