@@ -1,3 +1,5 @@
+#include <cstdlib>
+
 #include <nanobind/nanobind.h>
 
 #include "arrays.hpp"
@@ -14,8 +16,9 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
   const nb::object module_name = m.attr("__name__");
   m.attr("__name__") = "linkwise._core";
 
-  // A thread that outlives the interpreter keeps its objects: there is nothing to warn of.
-  nb::set_leak_warnings(false);
+  // A thread that outlives the interpreter keeps its objects, which users need not hear of; tests
+  // do.
+  nb::set_leak_warnings(std::getenv("LINKWISE_LEAK_WARNINGS") != nullptr);
   linkwise::bindings::find_numpy();
   m.attr("cpu_target") = LINKWISE_CPU_TARGET;
   m.attr("lanes") = LINKWISE_LANES;
