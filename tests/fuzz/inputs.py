@@ -1,5 +1,6 @@
 """Damaged files and what is done with each: read as far as it can be, and computed with."""
 
+import contextlib
 import json
 import random
 import shutil
@@ -198,7 +199,10 @@ def _damage_folder(rng, place):
             (file.mkdir, lambda: file.symlink_to("/dev/zero"), lambda: file.symlink_to(place))
         )()
     else:
-        shutil.copytree(file.parent, place / rng.choice(("extra", "a b", "c")), dirs_exist_ok=True)
+        with contextlib.suppress(shutil.Error):  # a file stands where a folder of the copy would
+            shutil.copytree(
+                file.parent, place / rng.choice(("extra", "a b", "c")), dirs_exist_ok=True
+            )
 
 
 def _damage_json(rng, document):

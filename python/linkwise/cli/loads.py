@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +21,7 @@ from linkwise.cli.output import (
     whose,
     write_csv,
 )
+from linkwise.io.complaint import shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -90,7 +92,8 @@ def loads(
     for name in joint or ():
         if any(name == weld for weld, _, _ in machine.welds):
             raise InputError(
-                f"joint {name!r}: is fixed and its links are merged; add --at child for its load"
+                f"joint {shown(name)}: is fixed and its links are merged; "
+                "add --at child for its load"
             )
         joint_position(opened, name)
     found = collect(opened, machine, rating_tables(opened, ratings), certify, as_json)
@@ -167,7 +170,7 @@ def tighter_run(run: Run, path: Path, quiet: bool) -> Run:
     from linkwise.scenario import load_scenario
     from linkwise.simulation.simulate import simulate
 
-    if path.is_dir():
+    if os.path.isdir(path):
         return open_run(path)
     scenario = load_scenario(path)
     if scenario.text != run.dataset.attrs.get("scenario"):
@@ -244,7 +247,7 @@ def peak_shares(run: Run, model: Model, by: str) -> list[dict[str, Any]]:
     from linkwise.loads.causes import CAUSES, split_at_peaks
 
     if by not in CAUSES:
-        raise InputError(f"--split: {by!r} is unknown; use force or motion")
+        raise InputError(f"--split: {shown(by)} is unknown; use force or motion")
     found = split_at_peaks(run, by, model)  # type: ignore[arg-type]
     columns = {name: found[name].values for name in ("time", "total", "peak")}
     columns |= {str(name): found["share"].sel(cause=name).values for name in found["cause"].values}

@@ -10,6 +10,7 @@ import typer
 
 from linkwise.cli.model import FloatingBase, PackageDirs
 from linkwise.cli.output import JsonOption, console, print_json, say, say_warnings
+from linkwise.io.complaint import shown
 
 if TYPE_CHECKING:
     from linkwise.view.source import Source
@@ -103,7 +104,7 @@ def _check(color: str, export: Path | None, host: str, port: int) -> None:
     from linkwise.view.server import check_address
 
     if color not in ("size", "rating"):
-        raise InputError(f"--color: {color!r} is unknown; use size or rating")
+        raise InputError(f"--color: {shown(color)} is unknown; use size or rating")
     if export is not None:
         check_file(export)
     else:

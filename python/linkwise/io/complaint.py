@@ -11,6 +11,8 @@ import os
 from collections.abc import Collection, Iterable
 from typing import NoReturn
 
+import numpy as np
+
 from linkwise._core import InputError
 from linkwise.base import printable
 
@@ -39,6 +41,12 @@ def check_one_of(what: str, value: object, known: Collection[str]) -> None:
     if not (isinstance(value, str) and value in known):
         names = (" or " if len(known) == 2 else ", ").join(known)
         raise InputError(f"{what}: {shown(value)} is unknown; use {names}")
+
+
+def check_flag(what: str, value: object) -> None:
+    """InputError where `value` is neither True nor False: "no" would count as true."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{what}: {shown(value)} given; give True or False")
 
 
 def near(name: object, known: Iterable[str], kind: str = "known") -> str:

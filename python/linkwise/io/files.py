@@ -60,7 +60,7 @@ def _open_without_waiting(path: str, flags: int) -> int:
 
 def _nearby(path: Path) -> str:
     folder = path.parent
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         return f"(there is no directory '{shorten(folder, 200)}')"
     names = []
     with os.scandir(folder) as entries:
@@ -106,7 +106,4 @@ def resolve_mesh(
 
 def _is_file(path: Path) -> bool:
     """Whether a file stands there; not where no file could, such as under 5,000 letters."""
-    try:
-        return path.is_file()
-    except OSError:
-        return False
+    return os.path.isfile(path)  # Path.is_file raises there

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError, Model, as_floats
-from linkwise.io.complaint import complain, shorten
+from linkwise.io.complaint import check_flag, complain, shorten
 from linkwise.io.mjcf_equalities import Equality
 from linkwise.io.urdf import JointOrder, Mimic, read_urdf
 from linkwise.io.xml import local_name, parse_xml
@@ -65,8 +65,10 @@ def load(
     _check_choice(path, "joint_order", joint_order, get_args(JointOrder))
     _check_choice(path, "mimic", mimic, get_args(Mimic))
     _check_choice(path, "equality", equality, get_args(Equality))
+    check_flag("floating_base", floating_base)
+    check_flag("keep_fixed", keep_fixed)
     for directory in package_dirs:
-        if not Path(directory).is_dir():
+        if not os.path.isdir(directory):
             complain(
                 path,
                 "package_dirs",

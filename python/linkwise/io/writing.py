@@ -47,7 +47,7 @@ def _ask(path: str | os.PathLike[str]) -> _Target:
         mode = None
     except (OSError, ValueError) as error:
         raise target.error(f"cannot be written ({_reason(error)})") from None
-    if not place.parent.is_dir():
+    if not os.path.isdir(place.parent):
         raise InputError(
             f"{target.shown}: folder {str(place.parent)!r} does not exist; create it first"
         )

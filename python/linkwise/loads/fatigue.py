@@ -125,14 +125,26 @@ def cycles(run: RunLike, joint: str, quantity: str, model: Model | None = None) 
 
 
 def equivalent(ranges: Array, counts: Array, exponent: float, repetitions: float) -> float:
-    """Range that, `repetitions` times, damages as much as all cycles: (sum n S^m / N)^(1/m)."""
+    """Range that, `repetitions` times, damages as much as all cycles: (sum n S^m / N)^(1/m).
+
+    InputError where it is beyond all numbers, as for exponents far below 1.
+    """
     if ranges.size == 0:
         return 0.0
     largest = float(ranges.max())
     if largest == 0:
         return 0.0
     scaled = float(np.sum(counts * (ranges / largest) ** exponent))
-    return float(largest * (scaled / repetitions) ** (1 / exponent))
+    try:
+        found = largest * (scaled / repetitions) ** (1 / exponent)
+    except OverflowError:
+        found = np.inf
+    if not np.isfinite(found):
+        raise InputError(
+            f"exponents: with {exponent:g} the equivalent range is too large for a number; Woehler "
+            "lines have slopes of 3 to 15"
+        )
+    return float(found)
 
 
 @each_member

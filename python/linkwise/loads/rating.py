@@ -10,7 +10,7 @@ import numpy as np
 
 from linkwise._core import InputError
 from linkwise.base import Array
-from linkwise.io.complaint import near
+from linkwise.io.complaint import near, shown
 from linkwise.loads.engineering import QUANTITIES
 
 if TYPE_CHECKING:
@@ -35,7 +35,9 @@ class Rating:
             if value is None:
                 continue
             if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-                raise InputError(f"rating {field.name}: {value!r} is not a number; give one in SI")
+                raise InputError(
+                    f"rating {field.name}: {shown(value)} is not a number; give one in SI"
+                )
             if not (np.isfinite(value) and value > 0):
                 raise InputError(f"rating {field.name}: is {value:g}; give a positive number in SI")
 
@@ -49,8 +51,13 @@ def rating_table(
     for joint, rating in ratings.items():
         if joint not in where:
             raise InputError(
-                f"rating for joint {joint!r}: run holds no such joint; "
+                f"rating for joint {shown(joint)}: run holds no such joint; "
                 f"{near(joint, joints, 'the joints are')}"
+            )
+        if not isinstance(rating, Rating):
+            raise InputError(
+                f"rating for joint {shown(joint)}: is {shown(rating)}; give a Rating, such as "
+                "lw.loads.Rating(torque=40)"
             )
         for field in fields(rating):
             value = getattr(rating, field.name)

@@ -85,7 +85,7 @@ def check_target(path: str | os.PathLike[str]) -> None:
     if not target.name:
         raise InputError(f"{shown}: names no file; give a path such as 'run.zarr'")
     parent = target.parent
-    if not parent.is_dir():
+    if not os.path.isdir(parent):
         raise InputError(f"{shown}: folder {str(parent)!r} does not exist; create it first")
     if not os.access(parent, os.W_OK | os.X_OK):
         raise InputError(f"{shown}: folder {str(parent)!r} is not writable; choose another")

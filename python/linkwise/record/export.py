@@ -153,7 +153,7 @@ def write_csv(
         ((_, names),) = wanted.items()
         _write_table(dataset, names, target)
         return [target]
-    if target.exists() and not target.is_dir():
+    if os.path.exists(target) and not os.path.isdir(target):
         raise InputError(f"{str(path)!r}: exists and is not a folder; give a folder or a .csv file")
     try:
         target.mkdir(exist_ok=True)

@@ -66,13 +66,18 @@ ORDER = tuple(row["name"] for row in TABLE)
 TIME_ATTRS = {"long_name": "time", "units": "s"}
 
 
+def _is_list(value: object) -> bool:
+    """An array without axes is a Collection that cannot be walked."""
+    return isinstance(value, Collection) and not (isinstance(value, np.ndarray) and value.ndim == 0)
+
+
 def resolve_quantities(quantities: Collection[str] | None) -> tuple[str, ...]:
     """The quantities to record, in canonical order; None means all."""
     if quantities is None:
         return QUANTITIES
     if isinstance(quantities, str):
         quantities = [quantities]
-    if not isinstance(quantities, Collection):
+    if not _is_list(quantities):
         raise InputError(f"record: {shown(quantities)} given; give a list of quantities")
     for name in quantities:
         if not isinstance(name, str) or name not in QUANTITIES:
@@ -87,7 +92,7 @@ def resolve_joints(model: Model, joints: Sequence[str] | None) -> list[int]:
         return list(range(model.n_joints))
     if isinstance(joints, str):
         joints = [joints]
-    if not isinstance(joints, Collection) or not all(isinstance(name, str) for name in joints):
+    if not _is_list(joints) or not all(isinstance(name, str) for name in joints):
         raise InputError(f"joints: {shown(joints)} given; give a list of names of joints")
     return sorted({model.joint_index(name) for name in joints})
 

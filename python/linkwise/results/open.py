@@ -30,7 +30,7 @@ def open_run(path: str | os.PathLike[str]) -> Run:
     where = Path(os.path.abspath(path))
     shown = f"run {str(path)!r}"
     restore(where)
-    if not where.exists():
+    if not os.path.exists(where):  # Path.exists raises where a name is too long
         raise InputError(f"{shown}: does not exist; give a folder that linkwise wrote")
     attrs = run_attributes(where)
     listed = (where / LIST).is_file()

@@ -60,9 +60,15 @@ def check_bodies(n: int) -> None:
 def check_count(name: str, n: int) -> None:
     """InputError unless ``n`` is a whole number of at least 1 that the core can count to."""
     if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
-        raise InputError(f"{name} is {n!r}; give a whole number of at least 1")
+        raise InputError(f"{name} is {n!r:.60}; give a whole number of at least 1")
     if n >= 2**31:
-        raise InputError(f"{name} is {n!r}; give a whole number below 2^31")
+        raise InputError(f"{name} is {n!r:.60}; give a whole number below 2^31")
+
+
+def check_floating(floating_base: object) -> None:
+    """InputError where it is neither True nor False: "no" would count as true."""
+    if not isinstance(floating_base, bool | np.bool_):
+        raise InputError(f"floating_base is {floating_base!r:.60}; give True or False")
 
 
 def check_size(name: str, value: float, *, least: float | None = None) -> None:
@@ -109,6 +115,7 @@ def chain(
         MemoryError: there is no room for so many bodies.
     """
     check_bodies(n_bodies)
+    check_floating(floating_base)
     check_rod(length, mass, radius)
     return make_chain(
         n_bodies,

@@ -12,6 +12,7 @@ from linkwise.scenes.chain import (
     EARTH,
     check_bodies,
     check_count,
+    check_floating,
     check_rod,
     joint_axes,
     rod_inertia,
@@ -42,6 +43,7 @@ def tree(
     """
     check_bodies(n_bodies)
     check_count("branching", branching)
+    check_floating(floating_base)
     check_rod(length, mass, radius)
     directions = joint_axes(axes, n_bodies, seed)
     builder = ModelBuilder("tree", gravity=gravity)

@@ -8,6 +8,7 @@ from typing import Any
 
 from linkwise import _core
 from linkwise._core import InputError
+from linkwise.io.complaint import shown
 from linkwise.simulation.arguments import number, optional_count
 
 #: Of every option what holds where nothing is given, as the core states it.
@@ -53,7 +54,7 @@ class Numerics:
             elif field.type == "int | None":
                 value = optional_count(name, value)
             elif field.type == "str | None" and not isinstance(value, str):
-                raise InputError(f"{name}: {value!r} given; give a name in quotes")
+                raise InputError(f"{name}: {shown(value)} given; give a name in quotes")
             elif name == "solver_options":
                 value = dict(value) if isinstance(value, Mapping) else value
             options[name] = value

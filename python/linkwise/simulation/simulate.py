@@ -78,7 +78,7 @@ def check_driven(
         try:
             by_joint[joint] = as_drive(drive)
         except InputError as error:
-            raise InputError(f"drives[{joint!r}]: {error}") from None
+            raise InputError(f"drives[{shown(joint)}]: {error}") from None
     for frame, wrench in (wrenches or {}).items():
         name = str(frame)
         try:
@@ -125,13 +125,13 @@ def set_driven(
                 span = Span(end, start[0][q].copy(), start[1][v].copy())
             drive.apply(simulation, joint, span)
         except InputError as error:
-            raise InputError(f"drives[{joint!r}]: {error}") from None
+            raise InputError(f"drives[{shown(joint)}]: {error}") from None
         notes += [Ignored("", f"drives[{joint!r}]", note) for note in drive.notes(end)]
     for name, wrench in by_name.items():
         try:
             wrench.apply(simulation, name, None if start is None else Span(end))
         except InputError as error:
-            raise InputError(f"wrenches[{name!r}]: {error}") from None
+            raise InputError(f"wrenches[{shown(name)}]: {error}") from None
         notes += [Ignored("", f"wrenches[{name!r}]", note) for note in wrench.notes(end)]
     return _each_once(notes)
 

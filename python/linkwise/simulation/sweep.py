@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
+from linkwise.io.complaint import shown
 from linkwise.notes import Ignored, quiet, recorded_warnings, tell, warning_attrs, warnings_of
 from linkwise.scenario import Scenario, load_scenario, variant
 from linkwise.simulation.simulate import simulate
@@ -75,7 +76,7 @@ def sweep(
     base = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     for key, values in axes.items():
         if isinstance(values, str) or not len(values):
-            raise InputError(f"axes[{key!r}]: give a list of values")
+            raise InputError(f"axes[{shown(key)}]: give a list of values")
     combinations = list(itertools.islice(itertools.product(*axes.values()), MOST_MEMBERS + 1))
     if len(combinations) > MOST_MEMBERS:
         raise InputError(f"axes: more than {MOST_MEMBERS} members; sweep fewer values")
@@ -121,7 +122,7 @@ def _run_all(
 
     wanted = processes if processes is not None else len(os.sched_getaffinity(0))
     if isinstance(wanted, bool) or not isinstance(wanted, int) or wanted < 1:
-        raise InputError(f"processes: is {wanted!r}; give a whole number above zero")
+        raise InputError(f"processes: is {shown(wanted)}; give a whole number above zero")
     count = min(wanted, len(members))
     if count == 1:
         found = []

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from linkwise._core import InputError
+from linkwise.io.complaint import shown
 from linkwise.view.guard import Guard
 
 if TYPE_CHECKING:
@@ -42,11 +43,13 @@ def check_address(host: str, port: int) -> None:
     except PermissionError:
         raise InputError(f"port {port}: may not be used; give --port 8081") from None
     except socket.gaierror:
-        raise InputError(f"host {host!r}: is unknown; give an address of this machine") from None
+        raise InputError(
+            f"host {shown(host)}: is unknown; give an address of this machine"
+        ) from None
     except OSError as error:
         if error.errno == errno.EADDRNOTAVAIL:
             raise InputError(
-                f"host {host!r}: is no address of this machine; leave --host out"
+                f"host {shown(host)}: is no address of this machine; leave --host out"
             ) from None
         raise InputError(
             f"port {port}: is in use on {host}; give another with --port, or --port 0 for any free "

@@ -9,6 +9,7 @@ import numpy as np
 
 from linkwise._core import InputError
 from linkwise.base import Array, rows_per_block
+from linkwise.io.complaint import shown
 from linkwise.loads.causes import CAUSES, Split
 from linkwise.loads.engineering import derive, joint_directions
 from linkwise.loads.rating import rating_table
@@ -48,10 +49,12 @@ class CauseLoads:
         """Show these causes alone. Raises InputError where the run has no such cause."""
         for name in names:
             if name not in CAUSES["force"]:
-                raise InputError(f"cause {name!r}: is unknown; use {', '.join(CAUSES['force'])}")
+                raise InputError(
+                    f"cause {shown(name)}: is unknown; use {', '.join(CAUSES['force'])}"
+                )
             if name not in self.names:
                 why = self.missing or f"the run has none; it has {', '.join(self.names)}"
-                raise InputError(f"cause {name!r}: {why}")
+                raise InputError(f"cause {shown(name)}: {why}")
         self.chosen = set(names)
 
     @property

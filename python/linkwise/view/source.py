@@ -163,7 +163,7 @@ def open_source(target: PathLike, options: Options) -> Source:
     Raises InputError when it is neither, or lacks what is needed.
     """
     path = Path(target)
-    if path.is_dir():
+    if os.path.isdir(path):
         return _open_run(path, options)
     if options.model is not None:
         raise InputError(f"{str(path)!r}: --model goes with a run, and this is a file; remove it")
@@ -235,7 +235,7 @@ def _file_beside(path: Path, name: str) -> Path | None:
     """The model's file next to the run or in the current folder; a run keeps its name alone."""
     if not name or name != Path(name).name:
         return None
-    return next((f for f in (path.parent / name, Path(name)) if f.is_file()), None)
+    return next((f for f in (path.parent / name, Path(name)) if os.path.isfile(f)), None)
 
 
 def _check_same_machine(run: Run, model: Model, file: Path) -> None:

@@ -66,6 +66,7 @@ def test_the_spectrum_has_its_peak_and_its_power():
         (lambda run: lw.loads.cycles(run, "pivot", "f"), "quantity: 'f' is unknown"),
         (lambda run: lw.loads.damage_equivalent(run, exponents=[0]), "positive numbers"),
         (lambda run: lw.loads.damage_equivalent(run, repetitions=0), "positive number"),
+        (lambda run: lw.loads.damage_equivalent(run, [1e-3], 1e-9), "too large for a number"),
         (lambda run: lw.loads.load_duration(run, "pivot", "fx", bins=0), "number of classes"),
     ],
 )
