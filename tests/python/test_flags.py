@@ -11,9 +11,6 @@ CALLS = {
     "tree": lambda flag: lw.scenes.tree(2, floating_base=flag),
     "load": lambda flag: lw.load(ARM, floating_base=flag),
     "keep_fixed": lambda flag: lw.load(ARM, keep_fixed=flag),
-    "batch": lambda flag: lw.simulate_batch(
-        lw.scenes.chain(2), step=0.01, duration=0.01, extremes=flag
-    ),
 }
 
 
@@ -24,7 +21,7 @@ def test_other_values_are_refused(call, flag):
         CALLS[call](flag)
 
 
-@pytest.mark.parametrize("call", ["chain", "tree", "batch"])
+@pytest.mark.parametrize("call", ["chain", "tree"])
 def test_numpy_s_truth_values_are_taken(call):
     assert CALLS[call](np.bool_(True)) is not None
 

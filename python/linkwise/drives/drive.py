@@ -184,8 +184,6 @@ def _hand_over(
 ) -> None:
     """Give the core simulation a table, a function and what is known of it, or constants: it has a
     setter for each."""
-    if isinstance(value, Table) and value.times[-1] <= 0:
-        value = value.values[-1]  # nothing but its last row ever acts, at the start too
     if isinstance(value, Table):
         set_table = getattr(simulation, f"{setter}_table")
         set_table(name, value.times, value.values, interpolation=value.interpolation, **more)
@@ -278,7 +276,10 @@ class PD(Drive):
         return [*notes_on_span(times, end), *notes_on_turn(times, self.target.values[:, 0])]
 
     def apply(self, simulation: Any, joint: str, span: Span | None = None) -> None:
-        if isinstance(self.target, Table):
+        if isinstance(self.target, Table) and self.target.times[-1] <= 0:
+            # Its last row alone acts: the slope before it is no target velocity at the start.
+            simulation.drive_pd(joint, self.kp, self.kd, float(self.target.values[-1, 0]))
+        elif isinstance(self.target, Table):
             table = self.target
             simulation.drive_pd_table(
                 joint,

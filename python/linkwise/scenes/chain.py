@@ -128,5 +128,5 @@ def chain(
         gravity=gravity,
         damping=damping,
         armature=armature,
-        floating_base=floating_base,
+        floating_base=bool(floating_base),
     )

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from linkwise import _core
 from linkwise._core import Frame, InputError, Model, as_floats
 from linkwise.base import Array
-from linkwise.io.complaint import check_flag, shown
+from linkwise.io.complaint import shown
 from linkwise.loads.engineering import joint_directions
 from linkwise.notes import tell, warning_attrs, warnings_of
 from linkwise.record.provenance import plain, provenance
@@ -173,7 +173,6 @@ def simulate_batch(
     """
     models = _machines(model)
     first = models[0]
-    check_flag("extremes", extremes)
     sampled = sample_times(duration, every, times)
     keep = Recording(extremes=extremes).keeps_extremes(first.n_joints)
     schema = build_schema(first, QUANTITIES if record is None else record, extremes=keep)

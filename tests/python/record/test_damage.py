@@ -375,6 +375,8 @@ def test_chunks_without_a_list_are_checked_by_what_they_hold(copy, old, damaged)
     data = bytearray(file.read_bytes())
     if damaged == "bit":
         data[len(data) // 2] ^= 16
+        if old:
+            return  # nothing could tell
     elif damaged == "end":
         data = data[:-3]
     elif damaged == "other array":
