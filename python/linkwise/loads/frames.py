@@ -62,12 +62,25 @@ def _inboard(model: Model, child: Array, body: str | None) -> Array:
 
 
 def _of_joints(model: Model, q: Array, load: Array) -> _Loads:
-    """All joints of the model; load (..., joint, 6)."""
+    """All joints of the model, those that close loops behind the others; load (..., joint, 6)."""
     child = _core.joint_poses(model, q)
     inboard = np.asarray(model.joint_parents, dtype=np.intp)
     parent = child[..., np.maximum(inboard, 0), :, :]
     parent[..., inboard < 0, :, :] = np.eye(4)
+    if model.n_loops:
+        links, index = _core.link_poses(model, q), model.link_names.index
+        ends = [
+            links[..., [index(name) for name in names], :, :]
+            for names in (model.loop_child_link_names, model.loop_parent_link_names)
+        ]
+        child = np.concatenate([child, ends[0] @ model.loop_placements[:, 1]], axis=-3)
+        parent = np.concatenate([parent, ends[1]], axis=-3)
     return _Loads(load, child, parent)
+
+
+def _loaded(model: Model) -> dict[str, int]:
+    """Where each joint's load is among all of them."""
+    return {name: k for k, name in enumerate([*model.joint_names, *model.loop_names])}
 
 
 def _of_run(run: RunLike, model: Model, names: Sequence[str]) -> _Loads:
@@ -75,7 +88,7 @@ def _of_run(run: RunLike, model: Model, names: Sequence[str]) -> _Loads:
     everything = slice(None)
     q = rows(run, "position", everything)
     whole = _of_joints(model, q, rows(run, "joint_load", everything))
-    index = {name: k for k, name in enumerate(model.joint_names)}
+    index = _loaded(model)
     if list(names) == list(index):
         return whole
     welds = {name for name, _, _ in model.welds}
@@ -87,7 +100,7 @@ def _of_run(run: RunLike, model: Model, names: Sequence[str]) -> _Loads:
             parent = _inboard(model, whole.child, model.frame_placement(weld.parent)[0])
             found.append(_Loads(load, _core.frame_pose(model, q, weld.child), parent))
         else:
-            k = model.joint_index(name)
+            k = index[name] if name in index else model.joint_index(name)
             found.append(_Loads(*(part[:, k] for part in whole)))
     return _Loads(*(np.stack(parts, axis=1) for parts in zip(*found, strict=True)))
 
@@ -97,9 +110,10 @@ def _of_array(
 ) -> tuple[Array, _Loads]:
     """q, and the named joints of loads (..., n_joints, 6)."""
     load, state = as_floats(loads, "loads"), as_floats(q, "q")
-    if load.shape[-2:] != (model.n_joints, 6) or load.ndim < 2:
+    index = _loaded(model)
+    if load.shape[-2:] != (len(index), 6) or load.ndim < 2:
         raise InputError(
-            f"loads: shape {load.shape}; give (..., {model.n_joints}, 6), the loads of all joints"
+            f"loads: shape {load.shape}; give (..., {len(index)}, 6), the loads of all joints"
         )
     welds = {name for name, _, _ in model.welds}
     for name in names:
@@ -108,7 +122,7 @@ def _of_array(
                 f"joint {name!r} is fixed and its links are merged, so loads in an array do not "
                 "tell its own; give a run, or load the model with keep_fixed"
             )
-    take = [model.joint_index(name) for name in names]
+    take = [index[name] if name in index else model.joint_index(name) for name in names]
     found = _of_joints(model, state, load)
     return state, _Loads(*(part.take(take, axis=-3 if k else -2) for k, part in enumerate(found)))
 
@@ -227,7 +241,7 @@ def in_frame(
     if not (hasattr(run, "dataset") or hasattr(run, "data_vars")):
         if model is None or q is None:
             raise InputError("loads in an array need their machine and state; give model and q")
-        names = list(model.joint_names) if joint is None else _names(joint)
+        names = list(_loaded(model)) if joint is None else _names(joint)
         _checked(model, frame, fixed_in)
         state, found = _of_array(run, model, q, names)
         at = _as_point(point, len(names))
@@ -248,7 +262,7 @@ def _run_in_frame(
     machine = model_of(run, model)
     need_whole(run, machine, "joint_load", "position")
     _checked(machine, frame, fixed_in)
-    names = list(machine.joint_names) if joint is None else _names(joint)
+    names = list(_loaded(machine)) if joint is None else _names(joint)
     at = _as_point(point, len(names))
     known = dict.fromkeys([*machine.joint_names, *(name for name, _, _ in machine.welds)])
     for name in names:
@@ -258,7 +272,7 @@ def _run_in_frame(
     found = _of_run(run, machine, names)
     q = rows(run, "position", slice(None))
     moved, attrs = _in_frame(machine, q, found, frame, at, fixed_in)
-    own = set(names) <= set(machine.joint_names)
+    own = set(names) <= set(_loaded(machine))
     attrs["samples"] = what_samples_miss(run, names if own else None)
     made = _labelled(run, names, moved, attrs)
     return made.isel(joint=0) if isinstance(joint, str) else made

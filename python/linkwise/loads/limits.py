@@ -23,6 +23,8 @@ def _limited(run: RunLike, model: Model) -> list[tuple[str, int, float, float]]:
     low, high = model.lower_limit, model.upper_limit
     found, first = [], 0
     for name in names:
+        if name not in sizes:  # it closes a loop, and has no part in q
+            continue
         dofs = range(model.nv)[model.v_slice(name)]
         if len(dofs) == sizes[name]:  # quaternions have no limits
             found += [
