@@ -18,7 +18,7 @@ import sys
 from pathlib import Path
 
 from benchmarks.peers import Result, read, run_bench, write
-from benchmarks.report import short_table, target_table
+from benchmarks.report import at_commit, short_table, target_table
 from benchmarks.study import RESULTS, ROOT, say
 
 #: Studies that write NAME.md into a folder; the first has no table of its own in
@@ -40,7 +40,7 @@ def conditions_line(result: Result, name: str, folder: str) -> str:
     found = {name: c["packages"].get(package) for package, name in names.items()}
     peers = ", ".join(f"{name} {version}" for name, version in found.items() if version)
     return (
-        f"{c['processor']}, {c['cores']} cores, one used; {peers}. "
+        f"{c['processor']}, {c['cores']} cores, one used; linkwise{at_commit(c)}, {peers}. "
         f"Everything: [results/{name}]({folder}/{name}/bench.md)."
     )
 

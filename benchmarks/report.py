@@ -157,7 +157,7 @@ def _conditions(found: dict[str, Any]) -> str:
     busy = f", load average {load[0]:.1f}" if load else ""
     lines = [
         f"- {found['processor']}, {found['cores']} cores{busy}; {found['system']}",
-        f"- linkwise {found['linkwise']}{_commit(found)} (CPU target {found['cpu_target']}), "
+        f"- linkwise {found['linkwise']}{at_commit(found)} (CPU target {found['cpu_target']}), "
         f"Python {found['python']}, {packages}",
     ]
     lines += [f"- {NAMES[name]}, C++: `{flags}`" for name, flags in found["flags"].items()]
@@ -168,7 +168,7 @@ def _conditions(found: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _commit(found: dict[str, Any]) -> str:
+def at_commit(found: dict[str, Any]) -> str:
     return f" at {found['commit']}" if found.get("commit") else ""
 
 
