@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
+from helpers import odd_scenes
 from helpers.bound_scenes import KINDS, SCENES, coverage
 from helpers.loaded_arm import arm
 from helpers.random_trees import random_configuration
@@ -16,9 +17,12 @@ FEW = [
 ]
 
 
-@pytest.mark.parametrize("scene", FEW)
+ODD = {name: scene for scenes in odd_scenes.KINDS.values() for name, scene in scenes.items()}
+
+
+@pytest.mark.parametrize("scene", [*FEW, *(name for name in ODD if name.endswith(" 1"))])
 def test_bounds_hold(scene):
-    covered, total, _ = coverage(SCENES[scene], 1e-5)
+    covered, total, _ = coverage((SCENES | ODD)[scene], 1e-5)
     assert total >= 1
     assert covered == total
 
