@@ -4,6 +4,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "bind.hpp"
+#include "doc_text.hpp"
 #include "report.hpp"
 #include "states.hpp"
 
@@ -30,32 +31,24 @@ nb::object loads_by_cause(const PyModel& self, const std::vector<std::string>& n
 }  // namespace
 
 void bind_causes(nb::module_& m) {
-  m.def("joint_loads_by_cause", &loads_by_cause, "model"_a, "causes"_a, "q"_a, "v"_a.none(),
-        "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(), "prescribed"_a = nb::none(),
-        "method"_a = "articulated_body", "threads"_a = nb::none(),
-        R"(Joint loads that each cause alone makes; a joint load is linear in its causes.
+  m.def(
+      "joint_loads_by_cause", &loads_by_cause, "model"_a, "causes"_a, "q"_a, "v"_a.none(),
+      "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(), "prescribed"_a = nb::none(),
+      "method"_a = "articulated_body", "threads"_a = nb::none(),
+      doc::text(
+          R"(Joint loads that each cause alone makes; a joint load is linear in its causes.
 
-Every state is eliminated once and solved for each cause [rodriguez1987].
-
-Args:
-    model: the machine.
-    causes: any of "gravity", "velocity", "drive" (tau), "motion" (prescribed), "passive" (the
+Every state is eliminated once and solved for each cause [rodriguez1987].)",
+          {R"(    causes: any of "gravity", "velocity", "drive" (tau), "motion" (prescribed), "passive" (the
         model's damping, friction, springs and stops), "external".
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
-        tau: joint torques and forces (..., nv) [N m, N], None: zero. Leading axes broadcast.
-    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
-        point, in its joint frame, force first; None: no wrench.
-    prescribed: accelerations (..., nv) of the joints of Model.prescribe; the others are not read.
-    method: "articulated_body" or "constraint_force".
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (..., causes, n_joints, 6) [N, N m], as of joint_loads. All six causes add up to the joint loads
-    under all of these together.
-
-Raises:
-    InputError: a cause is unknown, shapes do not fit the model, or a number is not finite.
-    NumericsError: the method failed.)");
+)",
+           doc::q_v_tau, doc::external, doc::prescribed,
+           "    method: \"articulated_body\" or \"constraint_force\".\n"},
+          R"(    (..., causes, n_joints, 6) [N, N m], as of joint_loads. All six causes add up to the joint loads
+    under all of these together.)",
+          R"(a cause is unknown, shapes do not fit the model, or a number is not finite.
+    NumericsError: the method failed.)")
+          .c_str());
 }
 
 }  // namespace linkwise::bindings

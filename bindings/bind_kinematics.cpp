@@ -5,6 +5,7 @@
 #include <nanobind/stl/string.h>
 
 #include "bind.hpp"
+#include "doc_text.hpp"
 #include "frame.hpp"
 #include "linkwise/dynamics/quantities.hpp"
 #include "linkwise/forces/passive.hpp"
@@ -46,123 +47,89 @@ nb::object map_states(const PyModel& self, nb::handle q, nb::handle v, nb::handl
                           double* out) { f(m, q, v, out); });
 }
 
-void bind_forces(nb::module_& m) {
+/// Shapes of results.
+Shape scalar(const Model&) { return {}; }
+Shape six(const Model&) { return {6}; }
+Shape per_rate(const Model& m) { return {size(m.nv())}; }
+Shape pose_per_joint(const Model& m) { return {size(m.n_joints()), 4, 4}; }
+Shape pose_per_link(const Model& m) { return {m.links.size(), 4, 4}; }
+
+using OfPositions = void (*)(const Model&, const double* q, double* out);
+using OfStates = void (*)(const Model&, const double* q, const double* v, double* out);
+using ShapeOf = Shape (*)(const Model&);
+
+/// NAME(model, q, *, threads).
+void of_positions(nb::module_& m, const char* name, ShapeOf shape, OfPositions f, const char* title,
+                  const char* returns) {
   m.def(
-      "mass_matrix",
-      [](const PyModel& self, nb::handle q, nb::handle threads) {
-        const size_t nv = self.model->nv();
-        const States s(*self.model, q, nb::none(), nb::none(), "tau", nb::none());
-        const Executor executor =
-            executor_for(whole_number(threads, "threads"), s.count * self.model->n_bodies());
-        NewArray H(s.lead, {nv, nv});
-        without_gil([&](const GoOn& go_on) {
-          self.evaluator.mass_matrix(s.count, s.q.data, executor, H.data, go_on);
-        });
-        check_result(H.data, s.count * nv * nv);
-        return H.array;
+      name,
+      [shape, f](const PyModel& self, nb::handle q, nb::handle threads) {
+        return map_states(
+            self, q, nb::none(), threads, shape(*self.model),
+            [f](const Model& m, const double* q, const double*, double* out) { f(m, q, out); });
       },
       "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      R"(Joint-space mass matrix H with H dv/dt + bias = tau, by composite rigid bodies
-[walker1982].
+      doc::text(title, {doc::q}, returns).c_str());
+}
 
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m].
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    H (..., nv, nv) [kg m2, kg m, kg], symmetric, armatures on its diagonal.
-
-Raises:
-    InputError: shapes do not fit the model, or a number is not finite.)");
+/// NAME(model, q, v, *, threads).
+void of_states(nb::module_& m, const char* name, ShapeOf shape, OfStates f, const char* title,
+               const char* returns) {
   m.def(
-      "passive_torque",
-      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
-        return map_states(self, q, v, threads, {size(self.model->nv())},
-                          [](const Model& m, const double* q, const double* v, double* out) {
-                            std::fill(out, out + m.nv(), 0.0);
-                            add_passive_forces(m, q, v, out);
-                          });
+      name,
+      [shape, f](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
+        return map_states(self, q, v, threads, shape(*self.model), f);
       },
       "model"_a, "q"_a, "v"_a, nb::kw_only(), "threads"_a = nb::none(),
-      R"(Torque of the joints' own damping, friction, springs and compliant stops.
+      doc::text(title, {doc::q_v}, returns).c_str());
+}
 
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]. Leading axes broadcast.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
+nb::object mass_matrix(const PyModel& self, nb::handle q, nb::handle threads) {
+  const Model& m = *self.model;
+  const size_t nv = size(m.nv());
+  const States s(m, q, nb::none(), nb::none(), "tau", nb::none());
+  const Executor executor = executor_for(whole_number(threads, "threads"), s.count * m.n_bodies());
+  NewArray H(s.lead, {nv, nv});
+  without_gil([&](const GoOn& go_on) {
+    self.evaluator.mass_matrix(s.count, s.q.data, executor, H.data, go_on);
+  });
+  check_result(H.data, s.count * nv * nv);
+  return H.array;
+}
 
-Returns:
-    (..., nv) [N m, N], to be added to the drives' torque; docs/theory/forces.md has the laws.
+void passive_torque(const Model& m, const double* q, const double* v, double* out) {
+  std::fill(out, out + m.nv(), 0.0);
+  add_passive_forces(m, q, v, out);
+}
 
-Raises:
-    InputError: shapes do not fit the model, or a number is not finite.)");
+void bind_forces(nb::module_& m) {
+  m.def("mass_matrix", &mass_matrix, "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
+        doc::text(R"(Joint-space mass matrix H with H dv/dt + bias = tau, by composite rigid bodies
+[walker1982].)",
+                  {doc::q},
+                  "    H (..., nv, nv) [kg m2, kg m, kg], symmetric, armatures on its diagonal.")
+            .c_str());
+  of_states(m, "passive_torque", &per_rate, &passive_torque,
+            "Torque of the joints' own damping, friction, springs and compliant stops.",
+            "    (..., nv) [N m, N], to be added to the drives' torque; docs/theory/forces.md has "
+            "the laws.");
 }
 
 void bind_energies(nb::module_& m) {
-  m.def(
-      "kinetic_energy",
-      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
-        return map_states(self, q, v, threads, {},
-                          [](const Model& m, const double* q, const double* v, double* out) {
-                            *out = kinetic_energy(m, q, v);
-                          });
+  of_states(
+      m, "kinetic_energy", &scalar,
+      [](const Model& m, const double* q, const double* v, double* out) {
+        *out = kinetic_energy(m, q, v);
       },
-      "model"_a, "q"_a, "v"_a, nb::kw_only(), "threads"_a = nb::none(),
-      R"(Kinetic energy of the bodies and of the rotors (armature), v^T H v / 2.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]. Leading axes broadcast.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (...) [J].
-
-Raises:
-    InputError: shapes do not fit the model, or a number is not finite.)");
-  m.def(
-      "potential_energy",
-      [](const PyModel& self, nb::handle q, nb::handle threads) {
-        return map_states(self, q, nb::none(), threads, {},
-                          [](const Model& m, const double* q, const double*, double* out) {
-                            *out = potential_energy(m, q);
-                          });
-      },
-      "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      R"(Potential energy of gravity (zero at the world origin), joint springs and stops.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m].
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (...) [J].
-
-Raises:
-    InputError: shapes do not fit the model, or a number is not finite.)");
-  m.def(
-      "momentum",
-      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle threads) {
-        return map_states(self, q, v, threads, {6},
-                          [](const Model& m, const double* q, const double* v, double* out) {
-                            momentum(m, q, v, out);
-                          });
-      },
-      "model"_a, "q"_a, "v"_a, nb::kw_only(), "threads"_a = nb::none(),
-      R"(Momentum of all bodies about the world origin, in world axes; rotors are left out.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]. Leading axes broadcast.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (..., 6): linear [kg m/s], then angular [kg m2/s].
-
-Raises:
-    InputError: shapes do not fit the model, or a number is not finite.)");
+      "Kinetic energy of the bodies and of the rotors (armature), v^T H v / 2.", "    (...) [J].");
+  of_positions(
+      m, "potential_energy", &scalar,
+      [](const Model& m, const double* q, double* out) { *out = potential_energy(m, q); },
+      "Potential energy of gravity (zero at the world origin), joint springs and stops.",
+      "    (...) [J].");
+  of_states(m, "momentum", &six, &momentum,
+            "Momentum of all bodies about the world origin, in world axes; rotors are left out.",
+            "    (..., 6): linear [kg m/s], then angular [kg m2/s].");
 }
 
 /// The joint of a body given by the name of its link or by index.
@@ -184,49 +151,15 @@ int joint_of(const PyModel& self, nb::handle body) {
 }
 
 void bind_poses(nb::module_& m) {
-  m.def(
-      "joint_poses",
-      [](const PyModel& self, nb::handle q, nb::handle threads) {
-        return map_states(self, q, nb::none(), threads, {size(self.model->n_joints()), 4, 4},
-                          [](const Model& m, const double* q, const double*, double* out) {
-                            joint_poses(m, q, out);
-                          });
-      },
-      "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      R"(Poses of the joint frames, each fixed in its joint's child link.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m].
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (..., n_joints, 4, 4): matrices that take points [m] of a joint frame to the world.
-
-Raises:
-    InputError: shapes do not fit the model, or a number is not finite.)");
-  m.def(
-      "link_poses",
-      [](const PyModel& self, nb::handle q, nb::handle threads) {
-        return map_states(self, q, nb::none(), threads, {self.model->links.size(), 4, 4},
-                          [](const Model& m, const double* q, const double*, double* out) {
-                            link_poses(m, q, out);
-                          });
-      },
-      "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-      R"(Poses of all links of the source, merged ones too.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m].
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (..., links, 4, 4) in the order of Model.link_names: matrices that take points [m] of a link's
-    frame to the world.
-
-Raises:
-    InputError: shapes do not fit the model, or a number is not finite.)");
+  of_positions(m, "joint_poses", &pose_per_joint, &joint_poses,
+               "Poses of the joint frames, each fixed in its joint's child link.",
+               "    (..., n_joints, 4, 4): matrices that take points [m] of a joint frame to the "
+               "world.");
+  of_positions(
+      m, "link_poses", &pose_per_link, &link_poses,
+      "Poses of all links of the source, merged ones too.",
+      R"(    (..., links, 4, 4) in the order of Model.link_names: matrices that take points [m] of a link's
+    frame to the world.)");
   m.def(
       "body_jacobian",
       [](const PyModel& self, nb::handle q, nb::handle body, nb::handle threads) {
@@ -237,22 +170,15 @@ Raises:
                           });
       },
       "model"_a, "q"_a, "body"_a, nb::kw_only(), "threads"_a = nb::none(),
-      R"(Geometric Jacobian J of a body [featherstone2008, ch. 2]: J v is the velocity of its joint
-frame.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m].
-    body: name of a joint's child link, or the index of the joint.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    J (..., 6, nv): rows are the velocity of the joint point [m/s] and the angular velocity [rad/s],
-    in the axes of the joint frame.
-
-Raises:
-    InputError: the body is unknown or welded to another, shapes do not fit the model, or a number
-        is not finite.)");
+      doc::text(
+          R"(Geometric Jacobian J of a body [featherstone2008, ch. 2]: J v is the velocity of its joint
+frame.)",
+          {doc::q, "    body: name of a joint's child link, or the index of the joint.\n"},
+          R"(    J (..., 6, nv): rows are the velocity of the joint point [m/s] and the angular velocity [rad/s],
+    in the axes of the joint frame.)",
+          R"(the body is unknown or welded to another, shapes do not fit the model, or a number
+        is not finite.)")
+          .c_str());
 }
 
 /// Whether components are along the world's axes, or the frame's.
@@ -291,6 +217,9 @@ nb::object map_frame_motion(const PyModel& self, nb::handle q, nb::handle v,
       });
 }
 
+constexpr const char* components =
+    "    axes: of the components: \"world\", or \"frame\" for the frame's own.\n";
+
 void bind_frame_places(nb::module_& m) {
   m.def(
       "frame_pose",
@@ -302,19 +231,10 @@ void bind_frame_places(nb::module_& m) {
                           });
       },
       "model"_a, "q"_a, "frame"_a, nb::kw_only(), "threads"_a = nb::none(),
-      R"(Pose of a frame on any link.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m].
-    frame: a link's name, merged or not, or a Frame.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (..., 4, 4): matrix that takes points [m] of the frame to the world.
-
-Raises:
-    InputError: the link is unknown, shapes do not fit the model, or a number is not finite.)");
+      doc::text(R"(Pose of a frame on any link.)", {doc::q, doc::frame},
+                R"(    (..., 4, 4): matrix that takes points [m] of the frame to the world.)",
+                doc::unknown_link)
+          .c_str());
   m.def(
       "frame_jacobian",
       [](const PyModel& self, nb::handle q, nb::handle frame, const std::string& axes,
@@ -327,22 +247,15 @@ Raises:
                           });
       },
       "model"_a, "q"_a, "frame"_a, nb::kw_only(), "axes"_a = "world", "threads"_a = nb::none(),
-      R"(Geometric Jacobian J of a frame on any link [featherstone2008, ch. 2]: J v is its velocity, and
-J^T f the joint torques of a force and moment f on it.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m].
-    frame: a link's name, merged or not, or a Frame.
-    axes: of the rows: "world", or "frame" for the frame's own.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    J (..., 6, nv): rows are the velocity of the frame's origin [m/s] and the angular velocity
-    [rad/s]. Zero on the ground.
-
-Raises:
-    InputError: the link is unknown, shapes do not fit the model, or a number is not finite.)");
+      doc::text(
+          R"(Geometric Jacobian J of a frame on any link [featherstone2008, ch. 2]: J v is its velocity, and
+J^T f the joint torques of a force and moment f on it.)",
+          {doc::q, doc::frame,
+           "    axes: of the rows: \"world\", or \"frame\" for the frame's own.\n"},
+          R"(    J (..., 6, nv): rows are the velocity of the frame's origin [m/s] and the angular velocity
+    [rad/s]. Zero on the ground.)",
+          doc::unknown_link)
+          .c_str());
 }
 
 void bind_frame_motions(nb::module_& m) {
@@ -355,20 +268,12 @@ void bind_frame_motions(nb::module_& m) {
       },
       "model"_a, "q"_a, "v"_a, "frame"_a, nb::kw_only(), "axes"_a = "world",
       "threads"_a = nb::none(),
-      R"(Velocity of a frame on any link against the world.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]. Leading axes broadcast.
-    frame: a link's name, merged or not, or a Frame.
-    axes: of the components: "world", or "frame" for the frame's own.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (..., 6): velocity of the frame's origin [m/s], then angular velocity [rad/s].
-
-Raises:
-    InputError: the link is unknown, shapes do not fit the model, or a number is not finite.)");
+      doc::text(
+          R"(Velocity of a frame on any link against the world.)",
+          {doc::q_v, doc::frame, components},
+          R"(    (..., 6): velocity of the frame's origin [m/s], then angular velocity [rad/s].)",
+          doc::unknown_link)
+          .c_str());
   m.def(
       "frame_acceleration",
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle acceleration, nb::handle frame,
@@ -378,22 +283,16 @@ Raises:
       },
       "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), "frame"_a, nb::kw_only(),
       "axes"_a = "world", "threads"_a = nb::none(),
-      R"(Acceleration of a frame on any link against the world, without gravity.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]; acceleration: of the joints
+      doc::text(
+          R"(Acceleration of a frame on any link against the world, without gravity.)",
+          {R"(    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s]; acceleration: of the joints
         (..., nv) [rad/s2, m/s2]. Leading axes broadcast; None: zero.
-    frame: a link's name, merged or not, or a Frame.
-    axes: of the components: "world", or "frame" for the frame's own.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (..., 6): second derivative of the origin's position [m/s2], then angular acceleration
-    [rad/s2]. An accelerometer there feels the first less gravity.
-
-Raises:
-    InputError: the link is unknown, shapes do not fit the model, or a number is not finite.)");
+)",
+           doc::frame, components},
+          R"(    (..., 6): second derivative of the origin's position [m/s2], then angular acceleration
+    [rad/s2]. An accelerometer there feels the first less gravity.)",
+          doc::unknown_link)
+          .c_str());
 }
 
 }  // namespace

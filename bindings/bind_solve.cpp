@@ -315,16 +315,12 @@ nb::list initial_guess_list() {
 
 nb::list stop_rule_list() {
   nb::list out;
-  const auto add = [&](StopRule rule, const char* description) {
+  for (const StopRuleEntry& e : stop_rule_table()) {
     nb::dict d;
-    d["name"] = std::string(to_string(rule));
-    d["description"] = description;
+    d["name"] = std::string(e.name);
+    d["description"] = std::string(e.description);
     out.append(d);
-  };
-  add(StopRule::paper, "the last change, relative to the solution [sharf1993, section 5]");
-  add(StopRule::residual, "the residual, relative to the right-hand side");
-  add(StopRule::energy_norm,
-      "the error in the A-norm, relative to the solution: estimated, then bounded");
+  }
   return out;
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 // The kinds of bodies: what each answers, the table, and the dispatch. A new kind is a file like
 // rigid.hpp and one line of the table. The kind of a body is known while compiling wherever it is
-// asked: loops over ranges of equal bodies dispatch once per range (kinematics/body_state.hpp), and
-// lanes hold rigid bodies alone. Which methods take which kinds is in the table of methods.
+// asked: loops over ranges of equal bodies dispatch once per range (kinematics/kind_ranges.hpp),
+// and lanes hold rigid bodies alone. Which methods take which kinds is in the table of methods.
 #include <concepts>
 #include <cstdint>
 #include <span>

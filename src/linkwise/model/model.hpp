@@ -208,7 +208,7 @@ struct BodiesOfKind {
   }
 };
 
-/// f(body n). Loops that count dispatch once per range instead (kinematics/body_state.hpp).
+/// f(body n). Loops that count dispatch once per range instead (kinematics/kind_ranges.hpp).
 template <class F>
 LW_INLINE decltype(auto) with_body(const Model& model, int n, F&& f) {
   return BodyKinds::dispatch(model.topology[n].body_kind, [&](auto kind) -> decltype(auto) {

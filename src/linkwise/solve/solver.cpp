@@ -8,8 +8,10 @@
 namespace linkwise {
 namespace {
 
-/// In the order of the enum.
-constexpr std::string_view stop_rules[] = {"paper", "residual", "energy_norm"};
+constexpr StopRuleEntry stop_rules[] = {
+    {"paper", "the last change, relative to the solution [sharf1993, section 5]"},
+    {"residual", "the residual, relative to the right-hand side"},
+    {"energy_norm", "the error in the A-norm, relative to the solution: estimated, then bounded"}};
 
 bool positive(double x) { return x > 0.0; }
 
@@ -36,7 +38,9 @@ constexpr Option common[] = {
 
 }  // namespace
 
-std::string_view to_string(StopRule rule) { return stop_rules[static_cast<int>(rule)]; }
+std::span<const StopRuleEntry> stop_rule_table() { return stop_rules; }
+
+std::string_view to_string(StopRule rule) { return stop_rules[static_cast<int>(rule)].name; }
 
 StopRule stop_rule_from_name(std::string_view name) {
   std::string known;

@@ -22,6 +22,11 @@ enum class StopRule {
   energy_norm,  ///< estimate of ||x* - x||_A <= tolerance ||x*||_A + absolute_tolerance
 };
 
+struct StopRuleEntry {
+  std::string_view name, description;
+};
+/// In the order of the enum.
+std::span<const StopRuleEntry> stop_rule_table();
 std::string_view to_string(StopRule rule);
 /// InputError, listing the known names, when the name is unknown.
 StopRule stop_rule_from_name(std::string_view name);
