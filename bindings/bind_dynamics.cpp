@@ -2,8 +2,10 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
 #include "bind.hpp"
+#include "linkwise/dynamics/assembly.hpp"
 #include "linkwise/integrate/integrator.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "numbers.hpp"
@@ -335,7 +337,32 @@ Raises:
 
 }  // namespace
 
+void bind_assembly(nb::module_& m) {
+  m.def(
+      "assemble",
+      [](const PyModel& self, nb::handle q, nb::handle v, const std::vector<std::string>& hold) {
+        const Argument q0("q0", {size(self.model->nq())}, q), v0("v0", {size(self.model->nv())}, v);
+        if (!q0.given || q0.array.ndim() != 1 || !v0.given || v0.array.ndim() != 1)
+          throw InputError("q0 and v0 take the coordinates and rates of one state, shapes (" +
+                           std::to_string(self.model->nq()) + ",) and (" +
+                           std::to_string(self.model->nv()) + ",)");
+        const Assembly found =
+            linkwise::assemble(*self.model, {q0.data, q0.data + self.model->nq()},
+                               {v0.data, v0.data + self.model->nv()}, hold);
+        nb::dict out;
+        out["q"] = to_numpy(found.q);
+        out["v"] = to_numpy(found.v);
+        out["gap"] = found.gap;
+        out["released"] = nb::cast(found.released);
+        return out;
+      },
+      "model"_a, "q0"_a, "v0"_a, "hold"_a,
+      "The position near q0 (nq,) that closes all loops, and rates near v0 (nv,) that keep them "
+      "closed: see linkwise.assemble.");
+}
+
 void bind_dynamics(nb::module_& m) {
+  bind_assembly(m);
   bind_results(m);
   bind_forward(m);
   bind_inverse(m);

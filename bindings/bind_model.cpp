@@ -300,7 +300,16 @@ void bind_loops(ModelClass& c) {
             for (const LoopJoint& loop : s.model->loops.joints) names.append(loop.joint.name);
             return names;
           },
-          "Joints that close loops (n_loops,), in the order of their loads.");
+          "Joints that close loops (n_loops,), in the order of their loads.")
+      .def_prop_ro(
+          "loop_child_link_names",
+          [](const PyModel& s) {
+            nb::list names;
+            for (const LoopJoint& loop : s.model->loops.joints)
+              names.append(loop.joint.link < 0 ? "" : s.model->links[loop.joint.link].name);
+            return names;
+          },
+          "Link that each joint that closes a loop gives its load to (n_loops,).");
 }
 
 void bind_places(ModelClass& c) {

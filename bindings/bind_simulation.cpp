@@ -1,6 +1,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include "bind.hpp"
 #include "interrupt.hpp"
@@ -188,7 +189,11 @@ void bind_simulation(nb::module_& m) {
             new (self) PySimulation(model, options_of(options));
           },
           "model"_a, "options"_a)
-      .def("start", &PySimulation::start, "t0"_a, "q0"_a, "v0"_a)
+      .def("start", &PySimulation::start, "t0"_a, "q0"_a, "v0"_a,
+           "hold"_a = std::vector<std::string>())
+      .def_prop_ro(
+          "assembled", [](const PySimulation& s) { return s.simulation.assembled(); },
+          "What closing the loops changed at the start, one line; empty: nothing.")
       .def("advance", &advance, "times"_a, "quantities"_a = nb::none(),
            "The samples at times [s], which increase: a dictionary of the time and of the arrays "
            "(time, ...) of\n"

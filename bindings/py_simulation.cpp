@@ -300,14 +300,16 @@ nb::object PySimulation::extremes() {
   return to_numpy(found);
 }
 
-void PySimulation::start(double t0, nb::handle q, nb::handle v) {
+void PySimulation::start(double t0, nb::handle q, nb::handle v, std::vector<std::string> hold) {
   const Argument q0("q0", {static_cast<size_t>(model->nq())}, q),
       v0("v0", {static_cast<size_t>(model->nv())}, v);
   if (!q0.given || q0.array.ndim() != 1)
     throw InputError("q0 must have shape (" + std::to_string(model->nq()) + ",)");
   if (!v0.given || v0.array.ndim() != 1)
     throw InputError("v0 must have shape (" + std::to_string(model->nv()) + ",)");
-  simulation.start(t0, {q0.data, v0.data});
+  Start start{q0.data, v0.data};
+  start.hold = std::move(hold);
+  simulation.start(t0, start);
 }
 
 }  // namespace linkwise::bindings

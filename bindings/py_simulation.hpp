@@ -37,7 +37,7 @@ class PySimulation {
                        nb::handle breakpoints, nb::handle samples);
   void keep_extremes(nb::handle directions);
   nb::object extremes();
-  void start(double t0, nb::handle q, nb::handle v);
+  void start(double t0, nb::handle q, nb::handle v, std::vector<std::string> hold);
 
   /// The garbage collector's: a user's function may refer to its own simulation, by the traceback
   /// of an exception for one.

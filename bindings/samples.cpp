@@ -17,7 +17,7 @@ Columns::Columns(const Model& model, const Shape& lead, nb::handle wanted) {
     }
     const bool wrench = entry.axis == Axis::joints || entry.axis == Axis::bodies;
     Shape tail;
-    if (wrench) tail = {static_cast<size_t>(model.n_joints()), 6};
+    if (wrench) tail = {quantity_width(entry, model) / 6, 6};
     if (!wrench && entry.axis != Axis::none) tail = {quantity_width(entry, model)};
     const NewArray made(lead, tail);
     sample.values[k] = made.data;

@@ -58,6 +58,7 @@ PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
 
 # Returned Python objects are arrays, but for these.
 RETURNS = {
+    "assemble": "dict[str, Any]",
     "ConstraintSystem.recover": "tuple[Array, Array]",
     "ConstraintSystem.rows_per_joint": "list[int]",
     "ConstraintSystem.solve": "tuple[Array, Report]",

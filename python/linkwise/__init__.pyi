@@ -57,6 +57,8 @@ from linkwise.notes import ModelWarning as ModelWarning
 from linkwise.results import Run as Run
 from linkwise.results import open_run as open_run
 from linkwise.scenario import load_scenario as load_scenario
+from linkwise.simulation.assembling import Assembly as Assembly
+from linkwise.simulation.assembling import assemble as assemble
 from linkwise.simulation.batch import simulate_batch as simulate_batch
 from linkwise.simulation.numerics import Numerics as Numerics
 from linkwise.simulation.recording import Recording as Recording

@@ -143,16 +143,23 @@ def _joint_variables(
     positions, velocities = joint_scalars(model, selected)
     joint_names, children = model.joint_names, model.child_link_names  # lists made on every access
     names = text_array(joint_names[k] for k in selected)
-    one_each = np.array_equal(positions.labels, names) and np.array_equal(velocities.labels, names)
+    loops = range(model.n_joints, model.n_joints + model.n_loops)
+    load_names = [*joint_names, *model.loop_names]
+    one_each = (
+        not loops
+        and np.array_equal(positions.labels, names)
+        and np.array_equal(velocities.labels, names)
+    )
     q_dim, v_dim = ("joint", "joint") if one_each else ("coordinate", "dof")
 
     coordinates: dict[str, Coordinate] = {}
     variables: list[Variable] = []
+    everything = len(selected) == model.n_joints
+    loaded = [*selected, *loops] if everything else [*selected]
     for row in rows:
         if row["axis"] == "joints":
-            everything = len(selected) == model.n_joints
-            variables.append(_wrench_variable(row, "joint", selected, everything))
-            coordinates["joint"] = Coordinate(("joint",), names)
+            variables.append(_wrench_variable(row, "joint", loaded, everything))
+            coordinates["joint"] = Coordinate(("joint",), text_array(load_names[k] for k in loaded))
             coordinates["component"] = Coordinate(("component",), text_array(COMPONENTS))
             units = text_array(["N"] * 3 + ["N m"] * 3)
             coordinates[f"{row['name']}_units"] = Coordinate(("component",), units)
@@ -163,7 +170,7 @@ def _joint_variables(
         variables.append(_scalar_variable(row, dim, scalars, whole, coordinates))
         coordinates[dim] = Coordinate((dim,), scalars.labels)
     if "joint" in coordinates:
-        bodies = text_array(children[k] for k in selected)
+        bodies = text_array([*children, *model.loop_child_link_names][k] for k in loaded)
         about = {"long_name": "outboard body of the joint"}
         coordinates["body"] = Coordinate(("joint",), bodies, about)
     return variables, coordinates

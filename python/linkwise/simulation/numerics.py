@@ -35,6 +35,7 @@ class Numerics:
     solver_tolerance: float | None = None
     max_iterations: int | None = None
     state: str | None = None
+    assemble: str | None = None
     solver_options: Mapping[str, Any] | None = None
 
     def options(self, tolerance: float | None = None) -> dict[str, Any]:

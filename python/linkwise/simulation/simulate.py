@@ -393,7 +393,7 @@ def simulate(
         recording.quantities,
         recording.joints,
         wrenched_bodies(model, by_name),
-        extremes=recording.keeps_extremes(model.n_joints),
+        extremes=recording.keeps_extremes(model.n_joints) and not model.n_loops,
     )
     if on_failure not in ("raise", "return"):
         raise InputError(f'on_failure: {shown(on_failure)} is unknown; use "raise" or "return"')
@@ -422,6 +422,8 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_name)
+    if simulation.assembled:
+        notes.append(Ignored("", "assembly", simulation.assembled))
     ignored = [*notes, *_coarse_solver(simulation, options), *warnings_of(model)]
     attrs |= warning_attrs(ignored)
     if output is None:

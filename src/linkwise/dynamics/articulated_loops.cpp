@@ -8,6 +8,23 @@
 namespace linkwise {
 namespace {
 
+/// Of directions that are nearly dependent: a thousandth from a singular position.
+constexpr double weak_pivot = 1e-6;
+/// Pivots of the scaled Lambda below this are zero: rounding errors leave 1e-16 of a zero.
+constexpr double null_pivot = 1e-10;
+
+/// The widest gap, or slip, over its loop's length.
+double widest(const LoopStates& states, int n_loops, bool of_rates) {
+  double widest = 0;
+  for (int l = 0; l < n_loops; ++l) {
+    const LoopState& loop = states[l];
+    const LoopMiss miss = miss_of(loop, of_rates ? loop.slip : loop.gap);
+    const double size = loop.length + (of_rates ? loop.speed : 0);
+    widest = std::max(widest, (miss.shift + miss.turn * loop.length) / size);
+  }
+  return widest;
+}
+
 /// Part of a list of ranges: bodies [begin, end).
 std::vector<KindRange> part_of(const std::vector<KindRange>& all, int begin, int end) {
   std::vector<KindRange> part;
@@ -108,10 +125,29 @@ ArticulatedLoops::ArticulatedLoops(const Model& model)
   }
 }
 
+bool ArticulatedLoops::respond(const double* q, const double* asked, double null, double* du) {
+  at_rest_.assign(model_.nv(), 0.0);
+  SweepInput<double> in;
+  in.q = q;
+  in.tau = at_rest_.data();
+  in.gravity_factor = 0;
+  asked_ = asked;
+  null_ = null;
+  const bool sound = evaluate(in, du, nullptr);
+  asked_ = nullptr;
+  return sound;
+}
+
 bool ArticulatedLoops::evaluate(const SweepInput<double>& in, double* du, double* loads) {
   const bool with_loads = loads != nullptr;
   report_ = {};
   states_.update(in);
+  // A gap makes dependent constraints independent, by pivots of the order of its square: they are
+  // zero as well. And it makes what they demand differ.
+  const double gap = widest(states_, model_.n_loops(), false),
+               slip = widest(states_, model_.n_loops(), true);
+  if (!asked_) null_ = std::clamp(100 * gap * gap, null_pivot, 1e-4);
+  report_.open = std::max(gap, slip);
   sweeps_.start(with_loads);
   sweeps_.calc_velocities(in, model_.kind_ranges);
   sweeps_.add_external(in);
@@ -157,8 +193,8 @@ void ArticulatedLoops::place_forces(const SweepInput<double>& in, int g) {
       };
       add(member.at[0], wrench_on_a(loop, Q));
       add(member.at[1], wrench_on_b(model_.loops.joints[member.loop], Q));
-      w.r[member.row + i] = loop.r[i];
-      w.size[member.row + i] = std::abs(loop.r[i]);
+      w.r[member.row + i] = asked_ ? asked_[6 * member.loop + i] : loop.r[i];
+      w.size[member.row + i] = std::abs(w.r[member.row + i]);
     }
   }
 }
@@ -180,6 +216,7 @@ void ArticulatedLoops::place_coupling(const SweepInput<double>& in, int g,
       size += std::abs(term.factor * in.prescribed[term.v]);
     }
   }
+  if (asked_) known = -asked_[6 * model_.n_loops() + member.coupling];
   w.r[member.row] = -known;
   w.size[member.row] = size;
 }
@@ -229,12 +266,13 @@ void ArticulatedLoops::factor(int g) {
       for (int j = 0; j <= i; ++j) D[packed(i, j)] = dot(a, on_a[j]) + dot(b, on_b[j]);
     }
   }
-  system.factor();
+  system.factor(null_);
   report_.rows += group.rows;
   if (system.rank() < 0 || report_.rank < 0)
     report_.rank = -1;
   else
     report_.rank += system.rank();
+  report_.strong += system.rank_above(weak_pivot);
   report_.smallest_pivot = std::min(report_.smallest_pivot, system.smallest_pivot());
 }
 

@@ -26,6 +26,12 @@ class ArticulatedLoops {
   /// `failed_body`.
   bool evaluate(const SweepInput<double>& in, double* du, double* loads);
 
+  /// Rates du [nv] of a machine at rest at q that change the residuals of its loop joints by
+  /// `asked` [n_loops][6] and take the least kinetic energy: K du = asked, du^T H du / 2 as small
+  /// as that lets it be. What dependent constraints ask for in vain is left out, and so are
+  /// directions that hold less than `null` of what the strongest does.
+  bool respond(const double* q, const double* asked, double null, double* du);
+
   int failed_body() const { return sweeps_.failed_body(); }
   const LoopReport& report() const { return report_; }
   const LoopStates& states() const { return states_; }
@@ -75,6 +81,9 @@ class ArticulatedLoops {
   std::vector<std::vector<int>> terms_;  ///< by coupling: columns of its joints, -1: given motion
   std::vector<Force<double>> load_;
   LoopReport report_;
+  const double* asked_ = nullptr;  ///< in place of what rates ask for
+  double null_ = 0;                ///< pivots of the scaled Lambda below this are zero
+  std::vector<double> at_rest_;
 };
 
 }  // namespace linkwise

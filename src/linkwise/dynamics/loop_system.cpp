@@ -7,10 +7,6 @@
 namespace linkwise {
 namespace {
 
-/// Pivots of the scaled Lambda below this are zero. Rounding errors leave 1e-16 of a zero; a gap of
-/// a loop, or the distance from a singular position, leaves its square.
-constexpr double null_pivot = 1e-10;
-
 /// Rows that share a body are coupled.
 Profile profile_of(const LoopGroup& group) {
   std::vector<int> first(group.rows);
@@ -62,16 +58,16 @@ void LoopSystem::scale_matrix() {
   }
 }
 
-void LoopSystem::factor() {
+void LoopSystem::factor(double null) {
   for (size_t m = 0; m < blocks_.size(); ++m) cholesky_factor(blocks_[m].n, metric_[m].data(), 0.0);
   scale_matrix();
   if (is_small())
-    factor_exactly();
+    factor_exactly(null);
   else
     shifted_.factor(profile_, scaled_);
 }
 
-void LoopSystem::factor_exactly() {
+void LoopSystem::factor_exactly(double null) {
   const int n = profile_.size();
   dense_.assign(static_cast<size_t>(n) * n, 0.0);
   for (int i = 0; i < n; ++i) {
@@ -79,7 +75,7 @@ void LoopSystem::factor_exactly() {
     std::copy(own + profile_.first(i), own + i + 1,
               &dense_[static_cast<size_t>(i) * n + profile_.first(i)]);
   }
-  exact_.factor(n, dense_.data(), null_pivot);
+  exact_.factor(n, dense_.data(), null);
 }
 
 double LoopSystem::solve(std::vector<double>& x) {

@@ -20,18 +20,23 @@ class LoopSystem {
   double* row(int i) { return profile_.row(Lambda_.data(), i); }
   /// D of a member, lower triangle, packed.
   double* metric(size_t member) { return metric_[member].data(); }
-  void factor();
+  /// Pivots below `null` count as zero, in a small system.
+  void factor(double null);
 
   /// Of a small Lambda; -1 and 1 of a large one, whose null vectors are not counted on the way.
   int rank() const { return is_small() ? exact_.rank() : -1; }
   double smallest_pivot() const { return is_small() ? exact_.smallest_pivot() : 1; }
+  /// How many pivots are larger than `least`.
+  int rank_above(double least) const {
+    return is_small() ? exact_.rank_above(least) : shifted_.rank_above(profile_, least);
+  }
   /// x <- Lambda^+ x. Returns by how much the constraints contradict each other, where D is 1.
   double solve(std::vector<double>& x);
   /// What a number asked of row i is where D is 1, or a bound of it.
   double scale(size_t member, int k) const { return metric_[member][packed(k, k)]; }
 
   // Null vectors, after factor_exactly(), which is dense.
-  void factor_exactly();
+  void factor_exactly(double null = 1e-10);
   int n_null() const { return exact_.size() - exact_.rank(); }
   void null_vector(int k, std::vector<double>& f) const;
 

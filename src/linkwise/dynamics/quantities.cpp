@@ -1,6 +1,7 @@
 #include "linkwise/dynamics/quantities.hpp"
 
 #include "linkwise/forces/passive.hpp"
+#include "linkwise/kinematics/loop_states.hpp"
 
 namespace linkwise {
 namespace {
@@ -80,6 +81,13 @@ double kinetic_energy(const Model& model, const double* q, const double* v) {
 double potential_energy(const Model& model, const double* q) {
   const auto frames = element_frames(model, q);
   double energy = passive_potential(model, q);
+  if (has_passive_forces(model.loops)) {
+    LoopStates loops(model);
+    SweepInput<double> in;
+    in.q = q;
+    loops.update(in);
+    energy += passive_potential(model.loops, loops.q().data());
+  }
   for (int n = 0; n < model.n_bodies(); ++n) {
     const auto& X = frames[model.topology[n].first_element + model.topology[n].n_elements - 1];
     energy += with_body(model, n,

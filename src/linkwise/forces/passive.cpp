@@ -60,6 +60,21 @@ void add_forces(const Joints& joints, const double* q, const double* v, double* 
   }
 }
 
+template <class Joints>
+double stored_energy(const Joints& joints, const double* q) {
+  double energy = 0;
+  for (const Element& e : joints.elements)
+    for (int k = 0; has_scalar_coordinates(e) && k < e.nv; ++k) {
+      const auto at = [&](DofProperty p) { return joints.dof[static_cast<int>(p)][e.v + k]; };
+      const double x = q[e.q + k], stretch = x - at(DofProperty::rest_position);
+      energy += 0.5 * at(DofProperty::stiffness) * stretch * stretch;
+      if (!(at(DofProperty::limit_stiffness) > 0)) continue;
+      const double depth = std::max({0.0, x - at(DofProperty::upper), at(DofProperty::lower) - x});
+      energy += 0.5 * at(DofProperty::limit_stiffness) * depth * depth;
+    }
+  return energy;
+}
+
 }  // namespace
 
 void add_passive_forces(const Model& model, const double* q, const double* v, double* tau) {
@@ -70,19 +85,20 @@ void add_passive_forces(const LoopJoints& loops, const double* q, const double* 
   add_forces(loops, q, v, tau);
 }
 
+bool has_passive_forces(const LoopJoints& loops) {
+  using enum DofProperty;
+  for (const DofProperty p : {damping, friction, stiffness, limit_stiffness})
+    for (const double x : loops.dof[static_cast<int>(p)])
+      if (x != 0) return true;
+  return false;
+}
+
 double passive_potential(const Model& model, const double* q) {
-  if (!model.has_passive_forces()) return 0;
-  double energy = 0;
-  for (const Element& e : model.elements)
-    for (int k = 0; has_scalar_coordinates(e) && k < e.nv; ++k) {
-      const auto at = [&](DofProperty p) { return model.dof_values(p)[e.v + k]; };
-      const double x = q[e.q + k], stretch = x - at(DofProperty::rest_position);
-      energy += 0.5 * at(DofProperty::stiffness) * stretch * stretch;
-      if (!(at(DofProperty::limit_stiffness) > 0)) continue;
-      const double depth = std::max({0.0, x - at(DofProperty::upper), at(DofProperty::lower) - x});
-      energy += 0.5 * at(DofProperty::limit_stiffness) * depth * depth;
-    }
-  return energy;
+  return model.has_passive_forces() ? stored_energy(model, q) : 0;
+}
+
+double passive_potential(const LoopJoints& loops, const double* q) {
+  return stored_energy(loops, q);
 }
 
 }  // namespace linkwise

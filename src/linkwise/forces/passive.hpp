@@ -14,7 +14,11 @@ void add_passive_forces(const Model& model, const double* q, const double* v, do
 /// The same of joints that close loops: q, v and tau are theirs alone.
 void add_passive_forces(const LoopJoints& loops, const double* q, const double* v, double* tau);
 
+bool has_passive_forces(const LoopJoints& loops);
+
 /// Energy stored in springs and stops, J.
 double passive_potential(const Model& model, const double* q);
+/// The same of joints that close loops: q is theirs alone.
+double passive_potential(const LoopJoints& loops, const double* q);
 
 }  // namespace linkwise

@@ -56,6 +56,15 @@ void ShiftedFactor::factor(const Profile& profile, const std::vector<double>& A)
   }
 }
 
+int ShiftedFactor::rank_above(const Profile& profile, double least) const {
+  int count = 0;
+  for (int i = 0; i < profile.size(); ++i) {
+    const double root = profile.row(L_.data(), i)[i];
+    count += root * root > least;
+  }
+  return count;
+}
+
 void ShiftedFactor::solve_once(const Profile& profile, double* x) const {
   for (int i = 0; i < profile.size(); ++i) {
     const double* row = profile.row(L_.data(), i);

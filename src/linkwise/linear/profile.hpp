@@ -34,6 +34,8 @@ void multiply(const Profile& profile, const double* A, const double* x, double* 
 class ShiftedFactor {
  public:
   void factor(const Profile& profile, const std::vector<double>& A);
+  /// How many pivots are larger than `least`, which is far above the shift.
+  int rank_above(const Profile& profile, double least) const;
   /// x may be b. Returns the largest component of b - A x.
   double solve(const Profile& profile, const std::vector<double>& A, const double* b, double* x);
 

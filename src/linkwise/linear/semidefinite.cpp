@@ -69,6 +69,12 @@ void SemidefiniteFactor::factor(int n, const double* A, double null) {
     }
 }
 
+int SemidefiniteFactor::rank_above(double least) const {
+  int count = 0;
+  while (count < rank_ && row(count)[count] * row(count)[count] > least) ++count;
+  return count;
+}
+
 double SemidefiniteFactor::solve(const double* b, double* x) {
   const int m = n_ - rank_;
   y_.resize(n_);

@@ -16,6 +16,8 @@ class SemidefiniteFactor {
 
   int size() const { return n_; }
   int rank() const { return rank_; }
+  /// How many pivots are larger than `least`.
+  int rank_above(double least) const;
   /// The last that was not zero, over the first; 1 if there are none.
   double smallest_pivot() const { return smallest_; }
   /// Of the solutions of A x = b the one of least length. Returns by how much b misses what A

@@ -32,6 +32,9 @@ constexpr NumericsEntry table[] = {
     {"state", &Numerics::state,
      "what is integrated beside the coordinates: joint_rates, or body_velocities, the bodies' own "
      "velocities [sharf1993] (method constraint_force only)"},
+    {"assemble", &Numerics::assemble,
+     "what becomes of a start that leaves closed loops open: nearest, the position nearby that "
+     "closes them, or exact, it is refused"},
 };
 
 /// The share of a run's tolerance that one step may take, because the errors of hundreds of steps
@@ -76,6 +79,9 @@ SimulationOptions simulation_options(const Numerics& n, const Executor& executor
     if (name == "tolerance" || name == "absolute_tolerance") o.follow_error_test = false;
   set_options(o.dynamics.solver_options, solver_options);
   o.state = find_state(n.state);
+  if (n.assemble != "nearest" && n.assemble != "exact")
+    throw InputError("assemble '" + n.assemble + "' is unknown; known: nearest, exact");
+  o.exact_start = n.assemble == "exact";
   o.integrator = find_integrator(n.integrator).name;
   o.integration.tolerance = allowed_per_step;
   o.integration.step = n.step.value_or(0.0);

@@ -23,6 +23,7 @@ struct Numerics {
   std::optional<double> solver_tolerance;
   std::optional<int> max_iterations, max_steps;
   std::string state = "joint_rates";
+  std::string assemble = "nearest";
 };
 
 struct NumericsEntry {

@@ -31,4 +31,11 @@ void ParentAxes::derivative_from_child(const double* q, const double* v, double*
   }
 }
 
+void ParentAxes::derivative_to_child(const double* q, const double* v, double* dv) const {
+  for (const Element& e : elements_) {
+    const Vec3<double> turning = cross(angular_part(e, v), linear_part(e, v));
+    write(e, element_rotation(e, q) * linear_part(e, dv) - turning, dv);
+  }
+}
+
 }  // namespace linkwise

@@ -23,6 +23,8 @@ class ParentAxes {
 
   /// dv [nv], dv/dt of the rates v along the child's axes, becomes that along the previous frame's.
   void derivative_from_child(const double* q, const double* v, double* dv) const;
+  /// And back.
+  void derivative_to_child(const double* q, const double* v, double* dv) const;
 
  private:
   std::vector<Element> elements_;

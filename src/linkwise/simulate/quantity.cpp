@@ -40,7 +40,7 @@ constexpr QuantityEntry table[] = {
     {"joint_load", "joint_load", joints, Needs::loads, true, "N, N m", "joint load",
      "joint frame, fixed in the outboard body", "joint point: the origin of the joint frame",
      "wrench that the inboard body exerts on the outboard body through the joint",
-     [](const Instant& at, double* out) { copy(at.joint_load, 6 * at.model.n_joints(), out); },
+     [](const Instant& at, double* out) { copy(at.joint_load, 6 * at.model.n_loads(), out); },
      nullptr},
     {"external_wrench", "external_wrench", bodies, Needs::forces, false,
      "N (fx, fy, fz), N m (nx, ny, nz)", "external wrench", "joint frame, fixed in the body",
@@ -102,7 +102,7 @@ size_t quantity_index(std::string_view name) {
 }
 
 size_t quantity_width(const QuantityEntry& entry, const Model& model) {
-  const int widths[] = {model.nq(), model.nv(), 6 * model.n_joints(), 6 * model.n_joints(), 1};
+  const int widths[] = {model.nq(), model.nv(), 6 * model.n_loads(), 6 * model.n_joints(), 1};
   return widths[static_cast<int>(entry.axis)];
 }
 

@@ -28,7 +28,7 @@ struct Instant {
   const SimulationStatistics& statistics;
 };
 
-/// The columns of a quantity: one per coordinate [nq], rate [nv], joint [n_joints][6] or body that
+/// The columns of a quantity: one per coordinate [nq], rate [nv], joint [n_loads][6] or body that
 /// a joint carries [n_joints][6], or a single one [1].
 enum class Axis { coordinates, rates, joints, bodies, none };
 std::string_view to_string(Axis axis);

@@ -5,6 +5,7 @@
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/evaluator.hpp"
 #include "linkwise/forces/armature_bias.hpp"
+#include "linkwise/forces/passive.hpp"
 #include "linkwise/simulate/given_motion.hpp"
 
 namespace linkwise {
@@ -49,7 +50,8 @@ bool Setup::does_work() const {
   bool driven = false;
   for (const Drive& drive : drives)
     driven |= drive.kind != DriveKind::free && drive.kind != DriveKind::locked;
-  return driven || !wrenches.empty() || model->has_passive_forces();
+  return driven || !wrenches.empty() || model->has_passive_forces() ||
+         has_passive_forces(model->loops);
 }
 
 bool Setup::calls_functions() const {
@@ -61,13 +63,15 @@ bool Setup::calls_functions() const {
 
 void Setup::settle() {
   if (settled_) return;
-  refuse_loops(*model, "a simulation");
+  if (options.state)
+    refuse_loops(*model, "state " + std::string(options.state->name), "use the state joint_rates");
   any_motion_ = false;
   for (const Drive& drive : drives) any_motion_ |= drive.kind == DriveKind::motion;
   if (any_motion_ && options.state)
     throw InputError("state " + std::string(options.state->name) +
                      " takes no motion drives; use the state joint_rates for them");
   driven_ = driven_model(*model, drives);
+  if (model->n_loops() + model->n_couplings() > 0) require_one_axis();
   for (const Element& e : driven().elements)
     if (options.state && !e.prescribed && has_armature_bias(driven(), e))
       throw InputError("state " + std::string(options.state->name) + " takes no armatures" +
@@ -76,6 +80,15 @@ void Setup::settle() {
   require_determined(driven());
   find_breakpoints();
   settled_ = true;
+}
+
+/// Torques that hold joints in loops are read off their loads.
+void Setup::require_one_axis() const {
+  for (size_t j = 0; j < drives.size(); ++j)
+    if (is_prescribed(drives[j].kind) && model->joints[j].nv != 1)
+      throw InputError("joint '" + model->joints[j].name + "'" + model->where() +
+                       " has several axes and a given motion; of machines with closed loops, "
+                       "joints of one axis take that");
 }
 
 /// As fine as the error test can tell, but neither finer than tables are written nor so coarse that
@@ -98,6 +111,7 @@ void Setup::find_breakpoints() {
 
 void check_members(const Setup& setup) {
   const SimulationOptions& options = setup.options;
+  refuse_loops(*setup.model, "a batch", "simulate its members one after the other");
   if (options.dynamics.method != "articulated_body")
     throw InputError("method '" + options.dynamics.method + "': a batch takes articulated_body");
   if (options.state)

@@ -17,6 +17,8 @@ struct SimulationOptions {
   /// one: see SolverTolerance. Otherwise its tolerance is that of the solver options.
   bool follow_error_test = false;
   std::string integrator = "auto";
+  /// Whether a start that leaves loops open is refused, and not moved to where they are closed.
+  bool exact_start = false;
   IntegratorOptions integration;
 };
 
@@ -50,6 +52,7 @@ struct Setup {
 
  private:
   void find_breakpoints();
+  void require_one_axis() const;
 
   std::unique_ptr<const Model> driven_;
   std::vector<Breakpoints> breakpoints_;

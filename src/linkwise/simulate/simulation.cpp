@@ -43,6 +43,7 @@ void Simulation::start(double t0, const Start& start) {
   y_.insert(y_.end(), start.v, start.v + members_ * nv());
   impose(t0, y_.data());
   for (size_t i = 0; i < members_; ++i) check_quaternions(m, y_.data() + i * nq());
+  close_loops(start.hold);
   endings_.assign(members_, {Outcome::converged, t0, "", ""});
   failure_ = {};
   iterations_ = 0;
@@ -134,6 +135,7 @@ SweepInput<double> Simulation::input(double t, const double* q, const double* v)
   in.tau = forces_->tau(0);
   in.prescribed = given_.data();
   in.external = forces_->external(0);
+  if (passive_loops_) add_loop_forces(in);
   return in;
 }
 
@@ -186,6 +188,7 @@ DynamicsReport Simulation::observed(double t, const std::function<DynamicsReport
 /// Of one member: an integrator that chooses its steps may recover, so nothing ends yet.
 Outcome Simulation::judge(double t, const DynamicsReport& report, const double* du, int n) {
   iterations_ += report.iterations;
+  loop_report_ = report.loops;
   double sum = 0;
   for (int i = 0; i < n; ++i) sum += du[i];
   // If rounding keeps the forces from the accuracy that the error test asks for, the fixed
@@ -263,9 +266,10 @@ Outcome Simulation::evaluate_by(DynamicsMethod* method, double t, const double* 
     y = evaluated_.data();
   }
   calc_position_rates(y, rates_in(y), ydot);
-  const Outcome outcome = accelerations(method, t, y, dv, nullptr);
+  Outcome outcome = accelerations(method, t, y, dv, nullptr);
   for (size_t i = 0; i < members_; ++i)
     parent_axes_.derivative_from_child(y + i * nq(), rates_in(y) + i * nv(), dv + i * nv());
+  if (loops_) outcome = steer(t, outcome, dv, method == method_.get());
   for (size_t i = 0; i < members_ && (given || any_ended()); ++i) {
     if (members_ > 1 && !endings_[i].ok()) {
       std::fill_n(ydot + i * nq(), nq(), 0.0);
@@ -291,11 +295,6 @@ void Simulation::calc_position_rates(const double* q, const double* v, double* q
       element_position_rate(e, q + i * nq(), v + i * nv(), qdot + i * nq());
 }
 
-Outcome Simulation::project(double /*t*/, double* y) {
-  for (size_t i = 0; i < members_; ++i) normalise_quaternions(model(), y + i * nq());
-  return Outcome::converged;
-}
-
 void Simulation::accepted(double t, const double* y) {
   report_accepted();
   if (solver_tolerance_) {
@@ -303,6 +302,8 @@ void Simulation::accepted(double t, const double* y) {
     solver_tolerance_->accepted(t, y, rates_in(y));
   }
   if (method_) method_->accepted(t);
+  if (loops_) coasting_.accepted();
+  if (passive_loops_) count_turns(t, y);
   if (accuracy_) weigh_forces(t, y);
 }
 
@@ -502,12 +503,13 @@ bool Simulation::powers(double t, double* out) {
     const long iterations = iterations_;
     const Ending failure = failure_;
     du_.resize(members_ * nv());
-    known =
-        accelerations(work_method_.get(), t, y_.data(), du_.data(), nullptr) == Outcome::converged;
+    work_loads_.resize(loops_ ? n_load() : 0);
+    known = accelerations(work_method_.get(), t, y_.data(), du_.data(),
+                          loops_ ? work_loads_.data() : nullptr) == Outcome::converged;
     iterations_ = iterations;
     failure_ = failure;
     if (work_method_) work_method_->accepted(t);
-    add_holding_torques();
+    add_holding_torques(work_loads_.data());
   } else {
     forces_->evaluate(t, y_.data(), v);
   }
@@ -520,15 +522,17 @@ bool Simulation::powers(double t, double* out) {
 bool Simulation::write_sample(double t, const Sample& sample) {
   if (sample.needs(Needs::forces)) {
     du_.resize(members_ * nv());
-    loads_.resize(sample.needs(Needs::loads) ? members_ * n_load() : 0);
+    const bool from_loads = loops_ && setup_->any_given();
+    loads_.resize(sample.needs(Needs::loads) || from_loads ? members_ * n_load() : 0);
     if (any_ended()) stand_in(y_.data());
     const long iterations = iterations_;
-    const Outcome outcome = accelerations(output_method_.get(), t, y_.data(), du_.data(),
-                                          loads_.empty() ? nullptr : loads_.data());
+    Outcome outcome = accelerations(output_method_.get(), t, y_.data(), du_.data(),
+                                    loads_.empty() ? nullptr : loads_.data());
+    if (loops_) outcome = steer_sample(t, outcome);
     iterations_ = iterations;  // those of the record are not the integration's
     if (outcome != Outcome::converged) return end_all(failure_);
     if (output_method_) output_method_->accepted(t);
-    if (setup_->any_given()) add_holding_torques();
+    if (setup_->any_given()) add_holding_torques(loads_.data());
   }
   const SimulationStatistics now = statistics();
   for (size_t i = 0; i < members_; ++i) {
@@ -564,7 +568,12 @@ void Simulation::check_sample(double t, size_t member, const Sample& sample) {
 }
 
 /// The drive torques of joints of given motion: what the motion takes, less what acts by itself.
-void Simulation::add_holding_torques() {
+/// loads: joint loads of a machine with loops.
+void Simulation::add_holding_torques(const double* loads) {
+  if (loops_) {
+    calc_torques_of_loads(loads);
+    return forces_->add_holding_torques(total_.data());
+  }
   if (!inverse_) inverse_ = std::make_unique<BatchEvaluator>(model());
   total_.resize(members_ * nv());
   BatchInput in = rows(y_.data(), 0);

@@ -6,8 +6,11 @@
 #include <memory>
 #include <optional>
 
+#include "linkwise/dynamics/assembly.hpp"
 #include "linkwise/dynamics/batch.hpp"
+#include "linkwise/dynamics/loop_projection.hpp"
 #include "linkwise/simulate/applied_forces.hpp"
+#include "linkwise/simulate/coasting.hpp"
 #include "linkwise/simulate/extremes.hpp"
 #include "linkwise/simulate/force_accuracy.hpp"
 #include "linkwise/simulate/parent_axes.hpp"
@@ -35,6 +38,8 @@ struct Start {
   const double *q = nullptr, *v = nullptr;
   const double* tau = nullptr;  ///< constant, beside the drives; null: none
   size_t members = 1;
+  /// Joints that closing loops leaves where they are, as long as it can: see assemble().
+  std::vector<std::string> hold = {};
 };
 
 class BodyVelocityState;
@@ -80,6 +85,8 @@ class Simulation : private OdeSystem {
 
   /// From the next start on; null: nobody. It must outlive the simulation's use.
   void set_observer(EvaluationObserver* observer) { observer_ = observer; }
+  /// What closing the loops changed at the start, one line; empty: nothing.
+  const std::string& assembled() const { return assembled_; }
   /// What is integrated in place of coordinates and joint rates; null: these.
   const IntegratedState* integrated_state() const { return state_.get(); }
 
@@ -90,7 +97,7 @@ class Simulation : private OdeSystem {
  private:
   size_t nq() const { return setup_->model->nq(); }
   size_t nv() const { return setup_->model->nv(); }
-  size_t n_load() const { return 6 * static_cast<size_t>(setup_->model->n_joints()); }
+  size_t n_load() const { return 6 * static_cast<size_t>(setup_->model->n_loads()); }
   double* rates_in(double* y) const { return y + members_ * nq(); }
   const double* rates_in(const double* y) const { return y + members_ * nq(); }
 
@@ -101,7 +108,7 @@ class Simulation : private OdeSystem {
   Outcome evaluate(double t, const double* y, double* ydot) override;
   Outcome evaluate_aside(double t, const double* y, double* ydot) override;
   void position_rates(const double* q, const double* v, double* qdot) override;
-  bool constrained() const override { return model().nq() != model().nv(); }
+  bool constrained() const override { return loops_ || model().nq() != model().nv(); }
   Outcome project(double t, double* y) override;
   void accepted(double t, const double* y) override;
   void error_scale(const double* y, double* scale) const override;
@@ -116,8 +123,12 @@ class Simulation : private OdeSystem {
   void watch_forces();
   void keep_acting(const double* ydot);
   void weigh_forces(double t, const double* y);
+  void close_loops(const std::vector<std::string>& hold);
+  void begin_coasting();
   bool follows_error_test() const;
   SweepInput<double> input(double t, const double* q, const double* v);
+  void add_loop_forces(SweepInput<double>& in);
+  void count_turns(double t, const double* y);
   BatchInput rows(const double* y, size_t member) const;
   Outcome evaluate_by(DynamicsMethod* method, double t, const double* y, double* ydot);
   Outcome accelerations(DynamicsMethod* method, double t, const double* y, double* du,
@@ -127,6 +138,8 @@ class Simulation : private OdeSystem {
   void report_accepted() {
     if (observer_) observer_->accepted();
   }
+  Outcome steer(double t, Outcome outcome, double* dv, bool remember);
+  Outcome steer_sample(double t, Outcome outcome);
   Outcome judge(double t, const DynamicsReport& report, const double* du, int n);
   std::string described(Outcome outcome, int body = -1) const;
   Ending failure(size_t member, double t, Outcome outcome, int body, const double* du) const;
@@ -147,7 +160,8 @@ class Simulation : private OdeSystem {
   bool powers(double t, double* out);
   bool write_sample(double t, const Sample& sample);
   void check_sample(double t, size_t member, const Sample& sample);
-  void add_holding_torques();
+  void add_holding_torques(const double* loads);
+  void calc_torques_of_loads(const double* loads);
 
   std::shared_ptr<Setup> setup_;
   ParentAxes parent_axes_;
@@ -159,8 +173,17 @@ class Simulation : private OdeSystem {
   std::unique_ptr<DynamicsMethod> method_, output_method_;
   std::unique_ptr<DynamicsMethod> aside_method_, work_method_;  ///< made when first needed
   std::unique_ptr<SolverTolerance> solver_tolerance_;  ///< of one member; null: a fixed one
-  std::unique_ptr<BatchEvaluator> lanes_;              ///< of several
-  std::unique_ptr<BatchEvaluator> inverse_;            ///< made when first needed
+  std::unique_ptr<LoopProjection> loops_;              ///< null: there are none
+  std::string assembled_;
+  Coasting coasting_;
+  LoopReport loop_report_;  ///< of the last evaluation
+  std::vector<double> steered_;
+  std::vector<double> projected_;
+  std::unique_ptr<LoopStates> passive_loops_;  ///< where loop joints have springs or damping
+  std::vector<double> work_loads_;
+  std::vector<double> loop_q_, loop_tau_;    ///< coordinates of the last accepted state
+  std::unique_ptr<BatchEvaluator> lanes_;    ///< of several
+  std::unique_ptr<BatchEvaluator> inverse_;  ///< made when first needed
   std::unique_ptr<Integrator> integrator_;
   std::unique_ptr<IntegratedState> state_;
   std::optional<WorkIntegral> work_;

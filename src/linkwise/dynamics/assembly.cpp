@@ -1,0 +1,214 @@
+#include "linkwise/dynamics/assembly.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <iomanip>
+#include <memory>
+#include <sstream>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/dynamics/loop_projection.hpp"
+
+namespace linkwise {
+namespace {
+
+/// Gaps are closed below the first; above the second, a position is not assembled.
+constexpr double closed = 1e-14, assembled = 1e-11;
+/// Rates are consistent below this share of a loop's length per second, at a rate of 1.
+constexpr double consistent = 1e-9;
+constexpr int most_steps = 80, halvings = 10, kicks = 3;
+constexpr double longest_turn = 0.5, kick = 1e-3;  // rad, or m
+/// Directions that hold less than this are left out, where with all of them no step gets nearer.
+constexpr double weakest[] = {1e-12, 1e-7, 1e-4, 1e-2};
+
+std::string rounded(double x) {
+  std::ostringstream text;
+  text << std::setprecision(3) << x;
+  return text.str();
+}
+
+class Closing {
+ public:
+  explicit Closing(const Model& model)
+      : model_(model), loops_(model), du_(model.nv()), step_(model.nv()) {}
+
+  /// Whether q could be assembled; otherwise it is the best that was found.
+  bool close(std::vector<double>& q) {
+    double open = newton(q);
+    std::uint32_t seed = 1;
+    for (int k = 0; k < kicks && open > assembled; ++k) {
+      std::vector<double> other = q;
+      leave_dead_end(seed, std::pow(10.0, k), other);
+      const double now = newton(other);
+      if (now < open) {
+        open = now;
+        q = other;
+      }
+    }
+    return open <= assembled;
+  }
+
+  LoopProjection& loops() { return loops_; }
+
+ private:
+  /// Returns what is left open.
+  double newton(std::vector<double>& q) {
+    double open = loops_.gap(q.data());
+    for (int k = 0; k < most_steps && open > closed; ++k) {
+      const double before = open;
+      for (const double null : weakest)
+        if (nearer(q, null, &open)) break;
+      if (!(open < before)) break;
+    }
+    return open;
+  }
+
+  /// A step that leaves less open.
+  bool nearer(std::vector<double>& q, double null, double* open) {
+    loops_.gap(q.data());
+    if (!loops_.close(q.data(), null, du_.data())) return false;
+    double turn = 0;
+    for (const double x : du_) turn = std::max(turn, std::abs(x));
+    double length = turn > longest_turn ? longest_turn / turn : 1;
+    std::vector<double> trial;
+    for (int k = 0; k < halvings; ++k, length /= 2) {
+      for (size_t i = 0; i < du_.size(); ++i) step_[i] = length * du_[i];
+      trial = q;
+      move_by(model_, step_.data(), trial.data());
+      const double now = loops_.gap(trial.data());
+      if (!(now < (1 - 0.1 * length) * *open)) continue;
+      *open = now;
+      q = trial;
+      return true;
+    }
+    return false;
+  }
+
+  /// Moves all joints that are free a little, in directions that are the same in every run.
+  void leave_dead_end(std::uint32_t& seed, double times, std::vector<double>& q) {
+    std::fill(step_.begin(), step_.end(), 0.0);
+    for (const Element& e : model_.elements)
+      for (int i = 0; i < e.nv && !e.prescribed; ++i) {
+        seed = 1664525u * seed + 1013904223u;
+        step_[e.v + i] = times * kick * (static_cast<double>(seed) / 2147483648.0 - 1);
+      }
+    move_by(model_, step_.data(), q.data());
+  }
+
+  const Model& model_;
+  LoopProjection loops_;
+  std::vector<double> du_, step_;
+};
+
+/// The loop that is open the widest.
+int widest(const Model& model, const LoopStates& states, bool of_rates) {
+  int worst = 0;
+  double largest = -1;
+  for (int l = 0; l < model.n_loops(); ++l) {
+    const LoopMiss miss = miss_of(states[l], of_rates ? states[l].slip : states[l].gap);
+    const double size = miss.shift / states[l].length + miss.turn;
+    if (size > largest) {
+      largest = size;
+      worst = l;
+    }
+  }
+  return worst;
+}
+
+[[noreturn]] void refuse_position(const Model& model, const LoopStates& states,
+                                  const std::vector<double>& q) {
+  require_coupled(model, q.data(), nullptr, "");
+  const int l = widest(model, states, false);
+  const LoopJoint& loop = model.loops.joints[l];
+  const LoopMiss miss = miss_of(states[l], states[l].gap);
+  const auto link = [&](int k) {
+    return k >= 0 ? "'" + model.links[k].name + "'" : std::string("the ground");
+  };
+  throw InputError("joint '" + loop.joint.name + "'" + model.where() +
+                   " cannot close its loop: at best it is open by " + rounded(1e3 * miss.shift) +
+                   " mm and " + rounded(miss.turn) + " rad between " + link(loop.parent_link) +
+                   " and " + link(loop.joint.link) +
+                   "; change lengths or the places of its joints, hold fewer joints, or start "
+                   "from another position");
+}
+
+/// The joints whose coordinates differ, with how much.
+std::vector<std::string> changes(const Model& model, const std::vector<double>& before,
+                                 const std::vector<double>& after) {
+  constexpr double worth_telling = 1e-9;
+  std::vector<std::string> lines;
+  for (const JointInfo& joint : model.joints) {
+    double largest = 0;
+    for (int k = joint.q; k < joint.q + joint.nq; ++k)
+      if (std::abs(after[k] - before[k]) > std::abs(largest)) largest = after[k] - before[k];
+    if (std::abs(largest) > worth_telling)
+      lines.push_back("'" + joint.name + "' by " + rounded(largest));
+  }
+  return lines;
+}
+
+std::unique_ptr<const Model> holding(const Model& model, const std::vector<std::string>& hold,
+                                     size_t n) {
+  ModelSpec spec = model.spec();
+  for (size_t k = 0; k < n; ++k)
+    if (std::find(spec.prescribed.begin(), spec.prescribed.end(), hold[k]) == spec.prescribed.end())
+      spec.prescribed.push_back(hold[k]);
+  return std::make_unique<const Model>(std::move(spec));
+}
+
+void make_consistent(const Model& model, LoopProjection& loops, const std::vector<double>& q,
+                     std::vector<double>& v) {
+  double fastest = 0;
+  for (const double x : v) fastest = std::max(fastest, std::abs(x));
+  double left = 0;
+  for (int k = 0; k < 3; ++k) left = loops.stop(q.data(), weakest[0], v.data());
+  left = loops.slip(q.data(), v.data());
+  if (left <= consistent * (1 + fastest)) return;
+  require_coupled(model, q.data(), v.data(), "");
+  const int l = widest(model, loops.states(), true);
+  const LoopMiss miss = miss_of(loops.states()[l], loops.states()[l].slip);
+  throw InputError("joint '" + model.loops.joints[l].joint.name + "'" + model.where() +
+                   " closes a loop whose given motions contradict each other, by " +
+                   rounded(miss.shift) + " m/s and " + rounded(miss.turn) +
+                   " rad/s; give fewer of them, or start where the machine can move");
+}
+
+}  // namespace
+
+Assembly assemble(const Model& model, std::vector<double> q, std::vector<double> v,
+                  const std::vector<std::string>& hold) {
+  for (const std::string& name : hold) model.joint_index(name);
+  Assembly out;
+  out.q = q;
+  out.v = v.empty() ? std::vector<double>(model.nv()) : std::move(v);
+  if (model.n_loops() + model.n_couplings() == 0) return out;
+  for (size_t n = hold.size();; --n) {
+    const std::unique_ptr<const Model> held = n > 0 ? holding(model, hold, n) : nullptr;
+    const Model& own = held ? *held : model;
+    Closing closing(own);
+    out.gap = closing.loops().gap(q.data());
+    out.q = q;
+    const bool done = closing.close(out.q);
+    if (!done && n > 0) continue;
+    closing.loops().gap(out.q.data());
+    if (!done) refuse_position(own, closing.loops().states(), out.q);
+    make_consistent(own, closing.loops(), out.q, out.v);
+    out.released.assign(hold.begin() + static_cast<std::ptrdiff_t>(n), hold.end());
+    out.moved = changes(model, q, out.q);
+    return out;
+  }
+}
+
+void require_assembled(const Model& model, const std::vector<double>& q,
+                       const std::vector<double>& v) {
+  LoopStates states(model);
+  SweepInput<double> in;
+  in.q = q.data();
+  in.v = v.data();
+  states.update(in);
+  require_closed(model, states);
+  require_coupled(model, q.data(), v.data(), "");
+}
+
+}  // namespace linkwise

@@ -1,0 +1,30 @@
+#pragma once
+// Assembles a machine whose loops are open: the position nearby that closes them, and rates that
+// keep them closed.
+#include <string>
+#include <vector>
+
+#include "linkwise/model/model.hpp"
+
+namespace linkwise {
+
+struct Assembly {
+  std::vector<double> q, v;
+  double gap = 0;                     ///< what was open before: see LoopProjection::gap
+  std::vector<std::string> released;  ///< of those to be held, in the order given
+  std::vector<std::string> moved;     ///< joints, with how much, one line each
+};
+
+/// Newton's method from q [nq] on, each step of which takes the least change in the metric of the
+/// mass matrix; then rates of least change of kinetic energy from v [nv], empty: at rest. Joints of
+/// given motion and those in `hold` stay where they are; where loops do not close so, those of
+/// `hold` are released, the last one first. InputError where no position is found, with the loop
+/// and what is left open, and where rates that are given contradict each other.
+Assembly assemble(const Model& model, std::vector<double> q, std::vector<double> v,
+                  const std::vector<std::string>& hold);
+
+/// InputError naming the loop where q and v leave one open.
+void require_assembled(const Model& model, const std::vector<double>& q,
+                       const std::vector<double>& v);
+
+}  // namespace linkwise

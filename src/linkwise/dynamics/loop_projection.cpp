@@ -1,0 +1,145 @@
+#include "linkwise/dynamics/loop_projection.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace linkwise {
+namespace {
+
+/// Gaps below this share of a loop's length are closed: rounding leaves as much.
+constexpr double closed = 1e-15;
+constexpr int most_steps = 4;
+/// Directions that are held by less than the first are left to drift until the machine has left a
+/// singular position: what closes them there is not small. Where masses are so unlike that some are
+/// never held by more, the second counts.
+constexpr double weak = 1e-6, null = 1e-12;
+
+}  // namespace
+
+void move_by(const Model& model, const double* du, double* q) {
+  double rate[7];
+  for (const Element& e : model.elements) {
+    Element own = e;  // rates alone, at the front of a small array
+    own.q = 0;
+    element_position_rate(own, q + e.q, du, rate);
+    for (int k = 0; k < e.nq; ++k) q[e.q + k] += rate[k];
+    const int quaternion = info_of(e.kind).quaternion;
+    if (quaternion < 0) continue;
+    double* p = q + e.q + quaternion;
+    const double length = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+    for (int k = 0; k < 4; ++k) p[k] /= length;
+  }
+}
+
+LoopProjection::LoopProjection(const Model& model)
+    : model_(model),
+      states_(model),
+      kernel_(model),
+      asked_(6 * static_cast<size_t>(model.n_loops()) + model.n_couplings()),
+      weakest_(weak),
+      du_(model.nv()) {}
+
+LoopReport LoopProjection::report_at(const double* q) {
+  gap(q);
+  close(q, null, du_.data());
+  return kernel_.report();
+}
+
+void LoopProjection::find_rank(const double* q) {
+  constexpr double beside = 0.03;  // rad, or m
+  LoopReport report = report_at(q);
+  full_ = report.strong;
+  int rank = report.rank;
+  std::vector<double> other, aside(model_.nv());
+  for (const double sign : {1.0, -1.0}) {
+    other.assign(q, q + model_.nq());
+    for (const Element& e : model_.elements)
+      for (int i = 0; i < e.nv && !e.prescribed; ++i)
+        aside[e.v + i] = sign * beside * std::cos(2.4 * (e.v + i));
+    move_by(model_, aside.data(), other.data());
+    for (int k = 0; k < 20 && gap(other.data()) > closed; ++k) {
+      if (!close(other.data(), null, du_.data())) break;
+      move_by(model_, du_.data(), other.data());
+    }
+    if (!(gap(other.data()) < 1e-11)) continue;
+    report = report_at(other.data());
+    if (report.strong <= full_) continue;
+    full_ = report.strong;
+    rank = report.rank;
+  }
+  weakest_ = full_ < rank ? null : weak;
+}
+
+/// The root of the sum of squares of residuals over their loops' lengths; what would undo them into
+/// asked_.
+double LoopProjection::miss(const double* q, const double* v) {
+  const bool of_rates = v != nullptr;
+  double sum = 0;
+  for (int l = 0; l < model_.n_loops(); ++l) {
+    const LoopState& loop = states_[l];
+    const double* residual = of_rates ? loop.slip : loop.gap;
+    const LoopMiss miss = miss_of(loop, residual);
+    sum += std::pow(miss.shift / loop.length, 2) + std::pow(miss.turn, 2);
+    for (int i = 0; i < loop.rows; ++i) asked_[6 * l + i] = -residual[i];
+  }
+  for (int c = 0; c < model_.n_couplings(); ++c) {
+    const Coupling& coupling = model_.couplings[c];
+    double residual = of_rates ? 0 : -coupling.offset;
+    for (const Coupling::Term& term : coupling.terms)
+      residual += term.factor * (of_rates ? v[term.v] : q[term.q]);
+    sum += residual * residual;
+    asked_[6 * static_cast<size_t>(model_.n_loops()) + c] = -residual;
+  }
+  return std::sqrt(sum);
+}
+
+double LoopProjection::gap(const double* q) {
+  SweepInput<double> in;
+  in.q = q;
+  states_.update(in);
+  return miss(q, nullptr);
+}
+
+bool LoopProjection::close(const double* q, double least, double* du) {
+  return kernel_.respond(q, asked_.data(), least, du);
+}
+
+double LoopProjection::slip(const double* q, const double* v) {
+  SweepInput<double> in;
+  in.q = q;
+  in.v = v;
+  states_.update(in);
+  return miss(q, v);
+}
+
+double LoopProjection::stop(const double* q, double least, double* v) {
+  const double before = slip(q, v);
+  if (before == 0) return before;
+  if (!kernel_.respond(q, asked_.data(), least, du_.data())) return NAN;
+  for (size_t i = 0; i < du_.size(); ++i) v[i] += du_[i];
+  return before;
+}
+
+Outcome LoopProjection::project(double* q, double* v) {
+  q_.assign(q, q + model_.nq());
+  const double start = gap(q_.data());
+  if (!std::isfinite(start)) return Outcome::not_finite;
+  double open = start;
+  for (int k = 0; k < most_steps && open > closed; ++k) {
+    if (!close(q_.data(), weakest_, du_.data())) return Outcome::not_positive_definite;
+    move_by(model_, du_.data(), q_.data());
+    const double before = open;
+    open = gap(q_.data());
+    if (!(open < 0.5 * before)) break;  // rounding, or what weak directions leave
+  }
+  if (!(open <= std::max(2 * start, 1e-10))) return Outcome::singular_position;
+  if (v) {
+    v_.assign(v, v + model_.nv());
+    if (!std::isfinite(stop(q_.data(), weakest_, v_.data()))) return Outcome::not_finite;
+    std::copy(v_.begin(), v_.end(), v);
+  }
+  std::copy(q_.begin(), q_.end(), q);
+  return Outcome::converged;
+}
+
+}  // namespace linkwise

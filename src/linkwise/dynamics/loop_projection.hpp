@@ -1,0 +1,58 @@
+#pragma once
+// Closes the loops of a state that is off them by the error of a step: positions first, by Newton's
+// method with the least change in the metric of the mass matrix, then rates with the least change
+// of kinetic energy,
+//     q <- q (+) -H^-1 K^T (K H^-1 K^T)^+ g,     u <- u - H^-1 K^T (K H^-1 K^T)^+ (K u - k_t) .
+// Each is one response of the recursion at rest. What given motions ask for is in g and in the slip
+// K u - k_t of the loop joints already, since these are taken with all rates.
+#include <vector>
+
+#include "linkwise/base/outcome.hpp"
+#include "linkwise/dynamics/articulated_loops.hpp"
+
+namespace linkwise {
+
+class LoopProjection {
+ public:
+  /// The model must outlive it; prescribed joints stay where they are.
+  explicit LoopProjection(const Model& model);
+
+  /// Looks how many directions the loops hold at q, which closes them, and at positions beside it.
+  /// The most of them is what they hold anywhere but in singular positions.
+  void find_rank(const double* q);
+  int full_rank() const { return full_; }
+
+  /// q [nq], v [nv]; v may be null. Any outcome but `converged` leaves both as they were.
+  Outcome project(double* q, double* v);
+
+  /// How far the loops are open at q: shifts over the loop's length, and turns, root of the sum of
+  /// squares.
+  double gap(const double* q);
+  /// One step of Newton's method from where gap() was asked: the change of rates du [nv].
+  bool close(const double* q, double least, double* du);
+  /// Takes out of v what opens the loops; returns by how much it did, as gap(), per second.
+  double stop(const double* q, double least, double* v);
+  /// The same as it is, without a change.
+  double slip(const double* q, const double* v);
+
+  const LoopStates& states() const { return states_; }
+  const LoopReport& report() const { return kernel_.report(); }
+
+ private:
+  double miss(const double* q, const double* v);
+  LoopReport report_at(const double* q);
+
+  const Model& model_;
+  LoopStates states_;
+  ArticulatedLoops kernel_;
+  std::vector<double> asked_;
+  int full_ = 0;
+  double weakest_;  ///< directions that hold less are left alone
+  std::vector<double> du_, q_, v_;
+};
+
+/// q moves by rates du [nv] for a unit of time, along the straight line of its coordinates;
+/// quaternions are put back to unit length.
+void move_by(const Model& model, const double* du, double* q);
+
+}  // namespace linkwise

@@ -1,0 +1,42 @@
+#pragma once
+// Carries a machine through singular positions, where its loops hold fewer directions than
+// elsewhere: a parallelogram stretched straight, for one. Its motion is smooth there, but what the
+// constraints demand is a difference of nearly equal numbers over the square of the distance, and
+// steps would become smaller without end. In a narrow window around such a position the
+// accelerations are those of the polynomial through the last ones before it.
+#include <deque>
+#include <vector>
+
+#include "linkwise/base/outcome.hpp"
+#include "linkwise/dynamics/loop_report.hpp"
+
+namespace linkwise {
+
+class Coasting {
+ public:
+  /// full: what the loops hold elsewhere, as LoopReport::strong.
+  void start(int full);
+
+  /// Replaces the accelerations dv at time t where the loops are nearly singular, and returns what
+  /// becomes of the outcome. remember: of the integration itself.
+  Outcome steer(double t, const LoopReport& loops, Outcome outcome, std::vector<double>& dv,
+                bool remember);
+  /// The step that the last evaluation belongs to is accepted.
+  void accepted();
+
+ private:
+  struct Known {
+    double t;
+    std::vector<double> dv;
+  };
+
+  void extrapolate(double t, std::vector<double>& dv) const;
+
+  int full_ = 0;
+  bool inside_ = false, remembered_ = false;
+  int steps_inside_ = 0;
+  Known last_;
+  std::deque<Known> known_;
+};
+
+}  // namespace linkwise

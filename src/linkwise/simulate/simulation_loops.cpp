@@ -1,0 +1,123 @@
+// What a simulation does for joints that close loops.
+#include <cmath>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/forces/passive.hpp"
+#include "linkwise/simulate/given_motion.hpp"
+#include "linkwise/simulate/simulation.hpp"
+
+namespace linkwise {
+void Simulation::close_loops(const std::vector<std::string>& hold) {
+  loops_.reset();
+  passive_loops_.reset();
+  loop_q_.clear();
+  assembled_.clear();
+  const Model& m = setup_->driven();
+  if (m.n_loops() + m.n_couplings() == 0) return;
+  loops_ = std::make_unique<LoopProjection>(m);
+  if (has_passive_forces(m.loops)) passive_loops_ = std::make_unique<LoopStates>(m);
+  normalise_quaternions(m, y_.data());
+  const std::vector<double> q(y_.begin(), y_.begin() + position_size()),
+      v(y_.begin() + position_size(), y_.end());
+  if (setup_->options.exact_start) {
+    require_assembled(m, q, v);
+    return begin_coasting();
+  }
+  const Assembly found = assemble(m, q, v, hold);
+  std::copy(found.q.begin(), found.q.end(), y_.begin());
+  std::copy(found.v.begin(), found.v.end(), rates_in(y_.data()));
+  begin_coasting();
+  const auto list = [&](const char* text, const std::vector<std::string>& names) {
+    for (size_t k = 0; k < names.size(); ++k)
+      assembled_ += (k > 0                ? ", "
+                     : assembled_.empty() ? text
+                                          : std::string("; ") + text) +
+                    names[k];
+  };
+  list("to close loops, joints were moved: ", found.moved);
+  list("joints that were to be held had to move: ", found.released);
+}
+
+void Simulation::begin_coasting() {
+  loops_->find_rank(y_.data());
+  coasting_.start(loops_->full_rank());
+}
+
+/// The state of joints of given motion is not integrated, and stays.
+Outcome Simulation::project(double t, double* y) {
+  for (size_t i = 0; i < members_; ++i) normalise_quaternions(model(), y + i * nq());
+  if (!loops_) return Outcome::converged;
+  projected_.assign(y, y + size());
+  double *q = projected_.data(), *v = rates_in(q);
+  to_state(q);
+  impose(t, q);
+  const Outcome outcome = loops_->project(q, v);
+  if (outcome != Outcome::converged) {
+    failure_ = {outcome, t, "", described(outcome)};
+    return outcome;
+  }
+  parent_axes_.from_child(q, v);
+  for (size_t j = 0; j < setup_->drives.size(); ++j) {
+    if (setup_->drives[j].kind == DriveKind::motion) continue;
+    const JointInfo& joint = model().joints[j];
+    std::copy_n(q + joint.q, joint.nq, y + joint.q);
+    std::copy_n(v + joint.v, joint.nv, rates_in(y) + joint.v);
+  }
+  return Outcome::converged;
+}
+
+/// Turns of loop joints are counted from the last accepted state on.
+void Simulation::add_loop_forces(SweepInput<double>& in) {
+  passive_loops_->update(in, loop_q_.empty() ? nullptr : loop_q_.data());
+  loop_tau_.assign(model().loops.nv, 0.0);
+  add_passive_forces(model().loops, passive_loops_->q().data(), passive_loops_->v().data(),
+                     loop_tau_.data());
+  in.loop_tau = loop_tau_.data();
+}
+
+/// dv: derivative of the rates of the integrator's y.
+Outcome Simulation::steer(double t, Outcome outcome, double* dv, bool remember) {
+  steered_.assign(dv, dv + nv());
+  outcome = coasting_.steer(t, loop_report_, outcome, steered_, remember);
+  std::copy(steered_.begin(), steered_.end(), dv);
+  return outcome;
+}
+
+/// The same of du_ and y_, which hold a state's rates.
+Outcome Simulation::steer_sample(double t, Outcome outcome) {
+  if (outcome == Outcome::converged && loop_report_.strong >= loops_->full_rank()) return outcome;
+  const double *q = y_.data(), *v = rates_in(q);
+  parent_axes_.derivative_from_child(q, v, du_.data());
+  outcome = steer(t, outcome, du_.data(), false);
+  parent_axes_.derivative_to_child(q, v, du_.data());
+  return outcome;
+}
+
+/// What joints of given motion pass on along their axes, and what their rotors take, into total_.
+void Simulation::calc_torques_of_loads(const double* loads) {
+  total_.assign(nv(), 0.0);
+  for (size_t j = 0; j < setup_->drives.size(); ++j) {
+    if (!is_prescribed(setup_->drives[j].kind)) continue;
+    const JointInfo& joint = model().joints[j];
+    const Force<double> load = transpose_times(joint.to_user, to_force(loads + 6 * j));
+    for (int k = 0; k < joint.n_elements; ++k) {
+      const Element& e = model().elements[joint.first_element + k];
+      const bool turns = e.kind != ElementKind::prismatic;
+      total_[e.v] = (turns ? load.ang.z : load.lin.z) + e.pitch * load.lin.z +
+                    model().dof_values(DofProperty::armature)[e.v] * du_[e.v];
+    }
+  }
+}
+
+/// Of an accepted state.
+void Simulation::count_turns(double t, const double* y) {
+  projected_.assign(y, y + size());
+  to_state(projected_.data());
+  impose(t, projected_.data());
+  SweepInput<double> in;
+  in.q = projected_.data();
+  passive_loops_->update(in, loop_q_.empty() ? nullptr : loop_q_.data());
+  loop_q_ = passive_loops_->q();
+}
+
+}  // namespace linkwise

@@ -1,0 +1,209 @@
+"""Machines with closed loops in motion: assembled, simulated, kept on their constraints."""
+
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+
+import linkwise as lw
+from linkwise.scenes import benchmark
+
+
+def rod(builder: lw.ModelBuilder, name: str, length: float) -> None:
+    """A rod of 1 kg along x from its frame's origin on."""
+    inertia = np.diag([1e-3, length**2 / 12, length**2 / 12])
+    builder.add_link(name, mass=1.0, com=(length / 2, 0, 0), inertia=inertia)
+
+
+def tip(model: lw.Model, run: lw.Run, joint: str, point) -> np.ndarray:
+    """World position of a point of a joint's frame at the samples."""
+    poses = lw.joint_poses(model, run.position.values)[:, model.joint_names.index(joint)]
+    return poses[:, :3, :3] @ np.asarray(point, float) + poses[:, :3, 3]
+
+
+def open_by(model: lw.Model, run: lw.Run) -> float:
+    """The widest gap of the four-bars' loops over all samples."""
+    gaps = [
+        tip(model, run, f"B{k - 1}", (1, 0, 0)) - tip(model, run, f"A{k}", (0, 1, 0))
+        for k in range(1, model.n_loops + 1)
+    ]
+    return float(np.abs(gaps).max())
+
+
+def state(model: lw.Model, **given: float) -> np.ndarray:
+    """Coordinates, or rates, by joints: A and B stand for all of theirs."""
+    names = model.joint_names
+    return np.array([given.get(name, given.get(name[0], 0.0)) for name in names])
+
+
+@pytest.mark.parametrize("integrator", ["adams", "bdf", "runge_kutta_8"])
+def test_a_parallelogram_swings_as_a_pendulum(integrator):
+    model, tolerance, angle = benchmark("four_bars", n=1).model, 1e-8, 1.0
+    # About the hanging position: both rods turn about their ends, the bar moves along a circle.
+    rate = np.sqrt(9.81 * (2 * 0.5 + 1) / (2 / 3 + 1))
+    start = state(model, A=np.pi + angle, B=-np.pi - angle)
+    run = lw.simulate(
+        model, duration=10, every=0.1, q0=start, integrator=integrator, tolerance=tolerance
+    )
+    k = np.sin(angle / 2) ** 2
+    sn = ellipj(ellipk(k) - rate * run.time.values, k)[0]
+    exact = 2 * np.arcsin(np.sqrt(k) * sn)
+    assert np.abs(run.position.sel(coordinate="A0").values - np.pi - exact).max() < 1e-6
+    assert open_by(model, run) < 1e-12
+    energy = (run.kinetic_energy + run.potential_energy).values
+    assert np.abs(energy - energy[0]).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("n", "end"), [(2, (0.3284581115, 0.9445185382)), (40, (0.1805122267, 0.9835727406))]
+)
+def test_four_bars_go_through_their_singular_positions(n, end):
+    """A02: the rods turn over, and all bars lie in one line twice in a turn."""
+    start = benchmark("four_bars", n=n)
+    run = lw.simulate(start.model, duration=10, every=10, q0=start.q0, v0=start.v0, tolerance=1e-10)
+    found = tip(start.model, run, "A0", (0, 1, 0))[-1, :2]
+    assert np.abs(found - end).max() < 1e-6
+    assert open_by(start.model, run) < 1e-11
+
+
+def test_a_bricard_mechanism_falls():
+    """A04; the reference was computed in another program, by other equations, to 8 digits."""
+    start = benchmark("bricard")
+    run = lw.simulate(start.model, duration=1, every=1, q0=start.q0, tolerance=1e-10)
+    found = tip(start.model, run, "P2", (0, 0, 1))[-1]
+    assert np.abs(found - (0.51050146, -1.64916760, 0.14012311)).max() < 2e-8
+
+
+def test_andrews_mechanism_at_the_end_of_the_test_set():
+    """A03 at 0.03 s, where two other programs agree to 1e-9."""
+    start = benchmark("andrews")
+    joints = ["beta", "Theta", "gamma", "Phi", "delta", "Omega", "epsilon"]
+    q = [
+        15.81077119515, -15.75637105841, 0.04082224011965, -0.5347301163421, 0.5244099658800,
+        0.5347301163421, 1.048080741042,
+    ]  # fmt: skip
+    v = [
+        1139.920302259, -1424.379295178, 11.03291191055, 19.29337410492, 0.5735699148261,
+        -19.29337410492, 0.3231791492473,
+    ]  # fmt: skip
+    run = lw.simulate(
+        start.model, duration=0.03, every=0.03, q0=start.q0, drives=start.drives, tolerance=1e-10
+    )
+    found = run.position.sel(coordinate=joints).values[-1]
+    assert np.abs(found / q - 1).max() < 1e-6
+    assert np.abs(run.velocity.sel(dof=joints).values[-1] - v).max() < 1e-4
+
+
+def slider_crank() -> lw.Model:
+    builder = lw.ModelBuilder("slider_crank", gravity=(0, -9.81, 0))
+    builder.add_link("ground")
+    rod(builder, "crank", 0.2)
+    rod(builder, "conrod", 0.5)
+    builder.add_link("slider", mass=2.0, inertia=0.01 * np.eye(3))
+    builder.add_joint("main", "revolute", "ground", "crank")
+    builder.add_joint("pin", "revolute", "crank", "conrod", translation=(0.2, 0, 0))
+    builder.add_joint("guide", "prismatic", "ground", "slider", axis=(1, 0, 0))
+    builder.add_loop("wrist", "revolute", "conrod", "slider", translation=(0.5, 0, 0))
+    return builder.build()
+
+
+def test_a_driven_slider_crank_follows_its_closed_form():
+    model, omega = slider_crank(), 7.0
+    crank = lw.Motion(lambda t: (omega * t, omega, 0.0), breakpoints=())
+    run = lw.simulate(
+        model, duration=1, every=0.01, drives={"main": crank}, q0=[0, 0, 0.7], tolerance=1e-8
+    )
+    angle = omega * run.time.values
+    sine = 0.2 * np.sin(angle)
+    exact = 0.2 * np.cos(angle) + np.sqrt(0.25 - sine**2)
+    guide = run.position.sel(coordinate="guide").values
+    assert np.abs(guide - exact).max() < 1e-7
+    # The drive's power is what the energy gains.
+    energy = (run.kinetic_energy + run.potential_energy).values
+    work = run.drive_work.sel(dof="main").values
+    assert np.abs(energy - energy[0] - work).max() < 1e-5
+
+
+def test_long_runs_stay_on_their_constraints():
+    model = benchmark("four_bars").model
+    q0 = state(model, A=np.pi - 0.7, B=-np.pi + 0.7)
+    run = lw.simulate(model, duration=100, every=1, q0=q0, tolerance=1e-5)
+    assert open_by(model, run) < 1e-12
+    energy = (run.kinetic_energy + run.potential_energy).values
+    assert np.abs(energy - energy[0]).max() < 1e-2
+
+
+def test_open_loops_are_closed_with_little_change():
+    model = benchmark("four_bars", n=1).model
+    given = state(model, A0=0.1, A1=0.05)
+    found = lw.assemble(model, given, state(model, A0=1))
+    assert 0.01 < found.gap < 0.3
+    assert np.abs(found.q - given).max() < 0.1
+    again = lw.assemble(model, found.q, found.v)
+    assert again.gap < 1e-12
+    assert np.abs(again.q - found.q).max() < 1e-12
+    assert np.abs(again.v - found.v).max() < 1e-12
+    left, right = model.joint_names.index("A0"), model.joint_names.index("A1")
+    assert found.v[left] == pytest.approx(found.v[right], abs=1e-12)  # of a parallelogram
+
+
+def test_held_joints_stay_where_they_are():
+    model = benchmark("four_bars", n=1).model
+    left, right = model.joint_names.index("A0"), model.joint_names.index("A1")
+    found = lw.assemble(model, state(model, A0=0.1), state(model, A0=2), hold=["A0"])
+    assert found.q[left] == 0.1
+    assert found.q[right] == pytest.approx(0.1, abs=1e-12)
+    assert found.v[left] == 2
+    assert found.v[right] == pytest.approx(2, abs=1e-12)
+    assert found.released == ()
+    found = lw.assemble(model, state(model, A0=0.1, A1=0.3), hold=["A0", "A1"])
+    assert found.released == ("A1",)
+    assert found.q[left] == 0.1
+
+
+def too_long() -> lw.Model:
+    """A bar that does not reach from one upright rod to the other."""
+    builder = lw.ModelBuilder("torn", gravity=(0, -9.81, 0))
+    builder.add_link("ground")
+    for name, at in (("left", 0.0), ("right", 4.0)):
+        rod(builder, name, 1.0)
+        builder.add_joint(f"pin_{name}", "revolute", "ground", name, translation=(at, 0, 0))
+    rod(builder, "bar", 1.0)
+    builder.add_joint("hook", "revolute", "left", "bar", translation=(1, 0, 0))
+    builder.add_loop(
+        "clasp", "revolute", "bar", "right", translation=(1, 0, 0), child_translation=(1, 0, 0)
+    )
+    return builder.build()
+
+
+def test_links_that_cannot_meet_are_named():
+    model = too_long()
+    said = r"'clasp'.* open by 1e\+03 mm .* between 'bar' and 'right'"
+    with pytest.raises(lw.InputError, match=said):
+        lw.assemble(model, [0.3, 0.2, 0.1])
+    with pytest.raises(lw.InputError, match="cannot close its loop"):
+        lw.simulate(model, duration=1)
+
+
+def test_motions_that_contradict_each_other_are_refused():
+    model = benchmark("four_bars", n=1).model
+    q, v = state(model, A=0.1, B=-0.1), state(model, A0=1, A1=2)
+    with pytest.raises(lw.InputError, match="contradict"):
+        lw.assemble(model, q, v, hold=["A0", "A1"])
+
+
+def test_simulations_say_what_they_moved():
+    model = benchmark("four_bars", n=1).model
+    q0 = state(model, A0=0.1)
+    run = lw.simulate(model, duration=0.1, q0=q0)
+    assert "joints were moved" in run.attrs["warnings"]
+    with pytest.raises(lw.InputError, match="is open"):
+        lw.simulate(model, duration=0.1, q0=q0, assemble="exact")
+
+
+def test_loads_of_loop_joints_stand_behind_the_others():
+    model = benchmark("four_bars", n=1).model
+    q0 = state(model, A=np.pi + 1, B=-np.pi - 1)
+    run = lw.simulate(model, duration=0.1, q0=q0)
+    assert list(run.joint_load.joint.values) == [*model.joint_names, *model.loop_names]
+    alone = lw.joint_loads(model, run.position.values[3], run.velocity.values[3])
+    assert np.abs(run.joint_load.values[3] - alone).max() < 1e-9
