@@ -264,7 +264,7 @@ def _run_in_frame(
     _checked(machine, frame, fixed_in)
     names = list(_loaded(machine)) if joint is None else _names(joint)
     at = _as_point(point, len(names))
-    known = dict.fromkeys([*machine.joint_names, *(name for name, _, _ in machine.welds)])
+    known = dict.fromkeys([*_loaded(machine), *(name for name, _, _ in machine.welds)])
     for name in names:
         if name not in known:
             hint = near(name, known, "the joints are")
