@@ -15,5 +15,7 @@ void bind_simulation(nanobind::module_& m);
 void bind_batch_simulation(nanobind::module_& m);
 void bind_solve(nanobind::module_& m);
 void bind_paper(nanobind::module_& m);
+/// Of all functions that were bound.
+void tell_wrong_arguments_on_one_line(nanobind::module_& m);
 
 }  // namespace linkwise::bindings

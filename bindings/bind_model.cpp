@@ -466,6 +466,13 @@ be a path; None keeps it.)")
           "description"_a,
           R"(The Model whose description to_bytes gave. Runs no code, unlike pickle; InputError for
 bytes that are no model.)")
+      .def("__eq__",
+           [](const PyModel& s, nb::handle other) {
+             if (!nb::isinstance<PyModel>(other)) return false;
+             const PyModel& o = nb::cast<const PyModel&>(other);
+             return s.model == o.model || hash_of(s) == hash_of(o);
+           })
+      .def("__hash__", [](const PyModel& s) { return nb::hash(nb::cast(hash_of(s))); })
       .def("__getstate__", [](const PyModel& s) { return to_bytes(s.model->spec()); })
       .def("__setstate__",
            [](PyModel& s, const nb::bytes& state) { new (&s) PyModel(from_bytes(state)); });

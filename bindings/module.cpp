@@ -48,6 +48,7 @@ Raises:
   linkwise::bindings::bind_batch_simulation(m);
   linkwise::bindings::bind_solve(m);
   linkwise::bindings::bind_paper(m);
+  linkwise::bindings::tell_wrong_arguments_on_one_line(m);
 
   m.attr("__name__") = module_name;
 }

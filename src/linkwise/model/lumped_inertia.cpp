@@ -52,13 +52,14 @@ void check_weld(const Machine& machine, int lead, int child, const std::string& 
 }
 
 /// A lump without mass that is a body carries several joints, or a stack of six degrees of freedom.
-/// What hangs on a light one is find_undetermined's business.
+/// What hangs on a light one is find_undetermined's business. No warning: loads are right, and the
+/// method that cannot take it refuses it.
 void note_massless(const Machine& machine, const Lumps& lumps, std::vector<Note>& notes) {
   for (int j : lumps.moving) {
     const int l = machine.graph.joints[j].child;
     if (!lumps.massless[l] || lumps.light[l] || lumps.stacked[l]) continue;
     notes.push_back(
-        {NoteLevel::warning, machine.link_name(l),
+        {NoteLevel::info, machine.link_name(l),
          std::string("has no mass and ") +
              (lumps.outboard[l] == 1 ? "joints on both sides with more than 6 degrees of freedom"
                                      : "carries several joints") +

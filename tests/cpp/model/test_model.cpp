@@ -109,7 +109,7 @@ TEST(LightLinks, AMasslessHubIsForTheRecursionOnly) {
   make_massless(spec.links[1]);
   const Model model(spec);
   EXPECT_EQ(notes_of(model),
-            Names{"warning link0: has no mass and carries several joints; method constraint_force "
+            Names{"info link0: has no mass and carries several joints; method constraint_force "
                   "cannot take it, articulated_body can"});
   EXPECT_EQ(model.singular_body(), 0);
   EXPECT_EQ(model.body_name(model.singular_body()), "link0");
