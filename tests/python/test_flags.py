@@ -39,3 +39,11 @@ def test_a_table_that_has_ended_before_the_start_is_its_last_row():
     drives = [lw.PD(10, 5, target) for target in (lw.Table([-1, 0], [1.0, 2.0]), 2.0)]
     runs = [lw.simulate(model, duration=0.1, every=0.05, drives={"joint_1": d}) for d in drives]
     np.testing.assert_array_equal(runs[0].drive_torque, runs[1].drive_torque)
+
+
+def test_what_loads_are_asked_for_is_a_list_and_a_point_that_numbers_reach():
+    run = lw.simulate(lw.scenes.chain(1), duration=0.02, every=0.01)
+    with pytest.raises(lw.InputError, match="give a list of names"):
+        lw.loads.damage_equivalent(run, joints=np.array("joint_1"))
+    with pytest.raises(lw.InputError, match="so far away"):
+        lw.loads.in_frame(run, "world", point=[1e308, 1e308, 1e308])

@@ -85,6 +85,11 @@ def _turning(run: RunLike, values: Array, joint: int, quantity: str) -> Array:
     return np.insert(values, np.searchsorted(run.dataset["time"].values, times), extremes)
 
 
+def _is_list(value: object) -> bool:
+    """An array without axes is an Iterable that cannot be walked."""
+    return isinstance(value, Iterable) and not (isinstance(value, np.ndarray) and value.ndim == 0)
+
+
 def _rainflow() -> object:
     try:
         import rainflow
@@ -180,7 +185,7 @@ def damage_equivalent(
     if given_count.ndim or not (np.isfinite(given_count) and given_count > 0):
         raise InputError("repetitions: give a positive number")
     count = float(given_count)
-    if joints is not None and (isinstance(joints, str) or not isinstance(joints, Iterable)):
+    if joints is not None and (isinstance(joints, str) or not _is_list(joints)):
         raise InputError(f"joints: {shown(joints)} given; give a list of names")
     names = joint_names(run) if joints is None else list(joints)
     where = [joint_position(run, name) for name in names]

@@ -151,7 +151,10 @@ def _in_frame(
         told = "(" + ", ".join(f"{x:g}" for x in point) + ") m" if point.ndim == 1 else ""
         where = f"{told or 'given per joint'} in the {_AXES[fixed_in]}"
     if at is not None:
-        world = move_wrench(world, found.child[..., :3, 3], at)
+        with np.errstate(over="ignore", invalid="ignore"):
+            world = move_wrench(world, found.child[..., :3, 3], at)
+        if not np.isfinite(world).all():
+            raise InputError("point: is so far away that moments there are too large for numbers")
     moved = _turned(world, np.swapaxes(axes[..., :3, :3], -1, -2))
     return moved, {"frame": shown, "point": where}
 
