@@ -13,8 +13,9 @@ namespace linkwise {
 
 /// Two methods, one of which takes rigid bodies alone.
 std::span<const DynamicsEntry> dynamics_table() {
-  static const DynamicsEntry table[] = {{"narrow", "", "", false, false, false, true, nullptr},
-                                        {"wide", "", "", false, false, true, true, nullptr}};
+  static const DynamicsEntry table[] = {
+      {"narrow", "", "", false, false, false, true, false, nullptr},
+      {"wide", "", "", false, false, true, true, false, nullptr}};
   return table;
 }
 
