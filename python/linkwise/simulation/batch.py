@@ -174,7 +174,7 @@ def simulate_batch(
     models = _machines(model)
     first = models[0]
     sampled = sample_times(duration, every, times)
-    keep = Recording(extremes=extremes).keeps_extremes(first.n_joints)
+    keep = Recording(extremes=extremes).keeps_extremes(first.n_joints) and not first.n_loops
     schema = build_schema(first, QUANTITIES if record is None else record, extremes=keep)
     unknown = [name for name in schema.quantities if name not in QUANTITIES]
     if unknown:
