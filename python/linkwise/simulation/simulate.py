@@ -34,6 +34,7 @@ from linkwise.simulation.arguments import (
     sample_times,
     state_vector,
 )
+from linkwise.simulation.determinacy import undetermined_loads
 from linkwise.simulation.numerics import DEFAULTS, Numerics
 from linkwise.simulation.recording import Recording
 from linkwise.simulation.time_loop import Progress, run_time_loop
@@ -375,7 +376,8 @@ def simulate(
     What was ignored or assumed when the model was made is in `run.warnings`, and a ModelWarning
     each where `linkwise.load` did not say it. `run.warnings` also names tables that do not cover
     the run, functions whose short changes may be missed, since when the motion is stiff, forces
-    whose gain is so large that they are not known well, and an iterative solver whose errors are
+    whose gain is so large that they are not known well, loads of closed loops that rigid bodies do
+    not determine, and an iterative solver whose errors are
     not bounded.
     """
     sampled = sample_times(duration, every, times)
@@ -424,6 +426,8 @@ def simulate(
     attrs |= _chosen(simulation, by_joint, by_name)
     if simulation.assembled:
         notes.append(Ignored("", "assembly", simulation.assembled))
+    if "joint_load" in schema.quantities:
+        notes += undetermined_loads(model, *start, [])
     ignored = [*notes, *_coarse_solver(simulation, options), *warnings_of(model)]
     attrs |= warning_attrs(ignored)
     if output is None:

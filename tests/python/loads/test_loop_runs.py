@@ -99,3 +99,22 @@ def test_a_stored_run_is_read_and_viewed(run, tmp_path):
 def test_what_is_not_there_yet_says_so_in_one_line(run):
     with pytest.raises(lw.InputError, match="loop"):
         lw.loads.split(run)
+
+
+def said_of_loads(run):
+    return [entry["text"] for entry in run.warnings if entry["element"] == "joint_load"]
+
+
+def test_loads_that_rigid_bodies_leave_open_are_told(run):
+    (text,) = said_of_loads(run)
+    for joint in NAMES:
+        assert f"'{joint}' (fz, nx, ny)" in text
+    assert "6 self-stresses" in text
+
+
+def test_loads_that_are_all_determined_go_without_a_word():
+    start = lw.scenes.benchmark("stewart")
+    run = lw.simulate(
+        start.model, duration=0.01, q0=start.q0, v0=start.v0, every=0.01, drives=start.drives
+    )
+    assert said_of_loads(run) == []
