@@ -70,6 +70,7 @@ CALLS = {
     "link_poses": "*q threads",
     "loop_gaps": "*q",
     "indeterminacy": "*q:state",
+    "assemble": "q0:state v0:rates",
     "mass_matrix": "*q threads",
     "body_jacobian": "*q *body threads",
     "frame_pose": "*q *frame:link threads",

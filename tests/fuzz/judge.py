@@ -57,7 +57,7 @@ def _outcome(action, named):
 
 
 def _is_of_a_call(error):
-    return "incompatible function arguments" in str(error) or "argument" in str(error)
+    return "argument" in str(error) or "(): takes (" in str(error)
 
 
 def _line(error, named):

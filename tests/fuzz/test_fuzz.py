@@ -46,7 +46,7 @@ OTHERWISE = {
     *("numerics", "quantities", "ForwardDynamicsResult", "Note", "Report", "Spectrum", "Run"),
     *("Progress", "InputError", "NumericsError", "SimulationError", "SimulationInterrupted"),
     *("ModelWarning", "Drive", "Free", "Locked", "ConstraintSystem", "DynamicsMethod", "Frame"),
-    *("Model", "ModelBuilder", "Indeterminacy"),
+    *("Model", "ModelBuilder", "Indeterminacy", "Assembly"),
 }
 
 

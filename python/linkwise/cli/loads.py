@@ -21,7 +21,6 @@ from linkwise.cli.output import (
     whose,
     write_csv,
 )
-from linkwise.io.complaint import shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,6 +74,7 @@ def loads(
 ) -> None:
     """Peak loads of every joint of a RUN: with bounds, by cause, against ratings."""
     from linkwise._core import InputError
+    from linkwise.io.complaint import shown
     from linkwise.io.writing import check_file
     from linkwise.loads.samples import joint_position
     from linkwise.results import open_run
@@ -244,6 +244,7 @@ def peak_shares(run: Run, model: Model, by: str) -> list[dict[str, Any]]:
     """What each cause adds to the peak force and moment, along them; the shares add up."""
     from linkwise._core import InputError
     from linkwise.base import HALVES
+    from linkwise.io.complaint import shown
     from linkwise.loads.causes import CAUSES, split_at_peaks
 
     if by not in CAUSES:

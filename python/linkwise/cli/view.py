@@ -10,7 +10,6 @@ import typer
 
 from linkwise.cli.model import FloatingBase, PackageDirs
 from linkwise.cli.output import JsonOption, console, print_json, say, say_warnings
-from linkwise.io.complaint import shown
 
 if TYPE_CHECKING:
     from linkwise.view.source import Source
@@ -100,6 +99,7 @@ def view(
 def _check(color: str, export: Path | None, host: str, port: int) -> None:
     """InputError for an option that cannot be met, before anything is read."""
     from linkwise._core import InputError
+    from linkwise.io.complaint import shown
     from linkwise.view.export import check_file
     from linkwise.view.server import check_address
 

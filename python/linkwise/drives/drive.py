@@ -476,6 +476,7 @@ class Wrench:
 
 
 def _former_frame(self: Wrench) -> str:
+    """The former name of `axes`, with a DeprecationWarning."""
     warnings.warn("Wrench.frame is now Wrench.axes", DeprecationWarning, stacklevel=2)
     return "body" if self.axes == "frame" else "world"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from linkwise import _core
@@ -20,15 +19,12 @@ _MOST_NAMED = 8
 _ELEMENT = "joint_load"
 
 
-def undetermined_loads(
-    model: Model, q: npt.ArrayLike, v: npt.ArrayLike, hold: Sequence[str]
-) -> list[Ignored]:
+def undetermined_loads(model: Model, q: npt.ArrayLike, v: npt.ArrayLike) -> list[Ignored]:
     """What is said of loads that no rigid-body calculation knows, at the start of a run.
 
     Args:
         model: the machine.
         q: (nq,) [rad, m]; v: (nv,) [rad/s, m/s]: the start, which is assembled first.
-        hold: joints that keep their coordinates then.
     """
     if not model.n_loops and not model.coupling_names:
         return []
@@ -41,7 +37,7 @@ def undetermined_loads(
                 "of this size; where constraints repeat each other they are one choice of many",
             )
         ]
-    found = _core.indeterminacy(model, _core.assemble(model, q, v, hold)["q"])
+    found = _core.indeterminacy(model, _core.assemble(model, q, v, [])["q"])
     names = [*model.joint_names, *model.loop_names]
     open_loads = {
         name: [c for c, known in zip(COMPONENTS, row, strict=True) if not known]

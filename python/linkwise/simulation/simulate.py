@@ -263,6 +263,17 @@ def _coarse_solver(simulation: Simulation, options: Mapping[str, Any]) -> list[I
     ]
 
 
+def _of_loops(
+    simulation: Simulation, model: Model, start: tuple[Array, Array], schema: Schema
+) -> list[Ignored]:
+    """What was moved to close the loops, and which of their loads are not determined."""
+    moved = simulation.assembled
+    said = [Ignored("", "assembly", moved)] if moved else []
+    if "joint_load" in schema.quantities:
+        said += undetermined_loads(model, *start)
+    return said
+
+
 def _attributes_at_end(simulation: Simulation, wall_time: float) -> dict[str, Any]:
     ending, done = simulation.ending, simulation.statistics
     return {
@@ -424,10 +435,7 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_name)
-    if simulation.assembled:
-        notes.append(Ignored("", "assembly", simulation.assembled))
-    if "joint_load" in schema.quantities:
-        notes += undetermined_loads(model, *start, [])
+    notes += _of_loops(simulation, model, start, schema)
     ignored = [*notes, *_coarse_solver(simulation, options), *warnings_of(model)]
     attrs |= warning_attrs(ignored)
     if output is None:

@@ -26,7 +26,7 @@ struct DynamicsOptions {
 /// What an evaluation reports: the solver's report, and where it failed.
 struct DynamicsReport : Report {
   int body = -1;  ///< at which it failed
-  LoopReport loops;
+  LoopReport loops = {};
 };
 
 class DynamicsMethod {

@@ -127,7 +127,7 @@ def test_a_run_whose_solver_stopped_too_early_says_so():
         q0=pose(model),
         numerics={"solver": "conjugate_gradient", "stop": "paper", "solver_tolerance": 1e-3},
     )
-    (said,) = [entry for entry in run.warnings if "solver" in entry["element"]]
+    (said,) = [entry for entry in run.warnings if entry["element"].startswith("solver ")]
     assert "no bound of the loads" in said["text"]
     assert "energy_norm" in said["text"]
     assert run.attrs["solver_error"] == "not bounded"
