@@ -92,7 +92,7 @@ TEST(LightLinks, SixDegreesOfFreedomStackSevenDoNot) {
             "mass and inertia (with_link, or [link.\"link0\"] in a scenario), or make the joint "
             "fixed, lock it, or give it armature");
   EXPECT_EQ(notes_of(model),
-            (Names{"warning link0: has no mass and joints on both sides with more than 6 degrees "
+            (Names{"info link0: has no mass and joints on both sides with more than 6 degrees "
                    "of freedom; method constraint_force cannot take it, articulated_body can",
                    "warning link0: links 'link0' have no mass, and joints 'joint0', 'joint1' leave "
                    "'link1' 9 degrees of freedom without armature, 6 at most are determined"}));
