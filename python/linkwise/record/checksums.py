@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwise._core import InputError
+from linkwise.base import printable
 
 GROUP = "files"
 LIST = f"{GROUP}/checksums.txt"
@@ -61,10 +62,11 @@ def write_list(folder: Path, checksums: Checksums) -> None:
 
 
 def damage(folder: Path, key: str, problem: str) -> InputError:
-    return InputError(
+    text = (
         f"run {str(folder)!r}: {key} {problem}; what needs this file cannot be read, copy the run "
         "again or simulate again"
     )
+    return InputError(printable(text))
 
 
 def plain_bytes(folder: Path, key: str) -> bytes | None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
-from linkwise.base import Array
+from linkwise.base import Array, printable
 from linkwise.record.checksums import LIST, damage, reason
 from linkwise.record.extremes import PREFIX
 from linkwise.record.labels import text_array
@@ -84,7 +84,7 @@ def _names(store: CheckedStore) -> list[str]:
 
 
 def _left_out(error: InputError, name: str) -> None:
-    warnings.warn(f"{error}; {name} is left out", UserWarning, stacklevel=2)
+    warnings.warn(printable(f"{error}; {name} is left out"), UserWarning, stacklevel=2)
 
 
 def _is_label(array: Any) -> bool:

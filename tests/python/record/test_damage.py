@@ -397,6 +397,15 @@ def test_a_label_that_is_not_listed_is_said(copy):
         lw.open_run(copy)
 
 
+@pytest.mark.filterwarnings("ignore:.*is left out")
+def test_a_damaged_name_in_the_list_is_told_on_a_printable_line(copy):
+    text = (copy / LIST).read_text()
+    (copy / LIST).write_text(text.replace("steps/zarr.json", "st\x00ps/zarr.json"))
+    with pytest.raises(lw.InputError, match=r"st.*ps/zarr\.json is damaged") as complaint:
+        lw.open_run(copy)
+    assert str(complaint.value).isprintable()
+
+
 def test_a_person_s_array_in_the_folder_is_no_part_of_the_run(whole, copy):
     import zarr
 
