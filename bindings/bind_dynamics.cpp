@@ -13,6 +13,7 @@
 #include "report.hpp"
 #include "solver_options.hpp"
 #include "states.hpp"
+#include "table_rows.hpp"
 
 namespace linkwise::bindings {
 namespace {
@@ -41,13 +42,6 @@ DynamicsOptions options_of(const std::string& method, const std::string& solver,
   return options;
 }
 
-void check_room(const Model& m, const States& s, bool passive, bool with_loads) {
-  const double scratch = 8.0 * s.count * m.nv() * (passive || !s.tau.given);
-  const double results = 8.0 * s.count * (m.nv() + (with_loads ? 6.0 * m.n_loads() : 0));
-  if (scratch + results > worth_a_check)
-    require_memory(scratch + results, "forward dynamics of " + std::to_string(s.count) + " states");
-}
-
 nb::object forward_dynamics(const PyModel& self, const States& s, bool passive, double gravity,
                             DynamicsOptions options, nb::handle threads, Wanted wanted) {
   const Model& m = *self.model;
@@ -56,7 +50,6 @@ nb::object forward_dynamics(const PyModel& self, const States& s, bool passive, 
   BatchInput in = s.input();
   in.passive_acts = passive;
   in.gravity_factor = gravity;
-  check_room(m, s, passive, with_loads);
   NewArray du(s.lead, {size(m.nv())});
   std::unique_ptr<NewArray> loads;
   if (with_loads) loads = std::make_unique<NewArray>(s.lead, Shape{size(m.n_loads()), 6});
@@ -105,45 +98,33 @@ nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::hand
 }
 
 nb::list solver_list() {
-  nb::list out;
-  for (const SolverEntry& e : solver_table()) {
-    nb::dict d;
-    d["name"] = std::string(e.name);
-    d["description"] = std::string(e.description);
-    d["kind"] = std::string(to_string(e.kind));
-    d["parallel"] = e.parallel;
-    d["reference"] = std::string(e.reference);
-    out.append(d);
-  }
-  return out;
+  return table_rows(solver_table(), [](auto&& row, const SolverEntry& e) {
+    row("name", e.name);
+    row("description", e.description);
+    row("kind", to_string(e.kind));
+    row("parallel", e.parallel);
+    row("reference", e.reference);
+  });
 }
 
 nb::list method_list() {
-  nb::list out;
-  for (const DynamicsEntry& e : dynamics_table()) {
-    nb::dict d;
-    d["name"] = std::string(e.name);
-    d["description"] = std::string(e.description);
-    d["reference"] = std::string(e.reference);
-    d["uses_solver"] = e.uses_solver;
-    d["chains_only"] = e.chains_only;
-    d["linear_time"] = e.linear_time;
-    d["takes_loops"] = e.takes_loops;
-    out.append(d);
-  }
-  return out;
+  return table_rows(dynamics_table(), [](auto&& row, const DynamicsEntry& e) {
+    row("name", e.name);
+    row("description", e.description);
+    row("reference", e.reference);
+    row("uses_solver", e.uses_solver);
+    row("chains_only", e.chains_only);
+    row("linear_time", e.linear_time);
+    row("takes_loops", e.takes_loops);
+  });
 }
 
 nb::list integrator_list() {
-  nb::list out;
-  for (const IntegratorEntry& e : integrator_registry()) {
-    nb::dict d;
-    d["name"] = std::string(e.name);
-    d["description"] = std::string(e.description);
-    d["fixed_step"] = e.fixed_step;
-    out.append(d);
-  }
-  return out;
+  return table_rows(integrator_registry(), [](auto&& row, const IntegratorEntry& e) {
+    row("name", e.name);
+    row("description", e.description);
+    row("fixed_step", e.fixed_step);
+  });
 }
 
 /// What pickling keeps of a report.

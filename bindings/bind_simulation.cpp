@@ -10,6 +10,7 @@
 #include "py_simulation.hpp"
 #include "samples.hpp"
 #include "solver_options.hpp"
+#include "table_rows.hpp"
 
 namespace linkwise::bindings {
 namespace {
@@ -84,42 +85,29 @@ SimulationOptions options_of(const nb::kwargs& given) {
 }
 
 nb::list numerics_list() {
-  nb::list out;
   const Numerics defaults;
-  for (const NumericsEntry& entry : numerics_table()) {
-    nb::dict row;
-    row["name"] = std::string(entry.name);
-    std::visit([&](auto member) { row["default"] = nb::cast(defaults.*member); }, entry.member);
-    row["units"] = std::string(entry.units);
-    row["kind"] = entry.member.index() < 2    ? "number"
-                  : entry.member.index() == 2 ? "count"
-                                              : "name";
-    row["description"] = std::string(entry.description);
-    out.append(row);
-  }
-  return out;
+  return table_rows(numerics_table(), [&](auto&& row, const NumericsEntry& e) {
+    row("name", e.name);
+    std::visit([&](auto member) { row("default", nb::cast(defaults.*member)); }, e.member);
+    row("units", e.units);
+    row("kind", e.kind());
+    row("description", e.description);
+  });
 }
 
 nb::list quantity_list() {
-  nb::list out;
-  for (const QuantityEntry& entry : quantity_table()) {
-    nb::dict row;
-    const auto text = [&](const char* key, std::string_view value) {
-      row[key] = std::string(value);
-    };
-    text("name", entry.name);
-    text("group", entry.group);
-    text("axis", to_string(entry.axis));
-    text("units", entry.units);
-    text("long_name", entry.long_name);
-    text("frame", entry.frame);
-    text("point", entry.point);
-    text("convention", entry.convention);
-    row["is_count"] = entry.count != nullptr;
-    row["of_members"] = entry.of_members;
-    out.append(row);
-  }
-  return out;
+  return table_rows(quantity_table(), [](auto&& row, const QuantityEntry& e) {
+    row("name", e.name);
+    row("group", e.group);
+    row("axis", to_string(e.axis));
+    row("units", e.units);
+    row("long_name", e.long_name);
+    row("frame", e.frame);
+    row("point", e.point);
+    row("convention", e.convention);
+    row("is_count", e.count != nullptr);
+    row("of_members", e.of_members);
+  });
 }
 
 void bind_ending(nb::module_& m) {

@@ -1,103 +1,54 @@
 // Solvers from Python: the tables of guesses, stop rules and options; the system A f = b of a model
 // at a state, to look at and to solve; and a dynamics method that keeps its warm starts between
 // calls.
-#include <chrono>
-
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
-#include "arrays.hpp"
 #include "bind.hpp"
-#include "interrupt.hpp"
-#include "linkwise/constraint/tree_system.hpp"
-#include "linkwise/forces/armature_bias.hpp"
-#include "linkwise/forces/passive.hpp"
+#include "linkwise/dynamics/constraint_system.hpp"
+#include "linkwise/dynamics/method_over_time.hpp"
 #include "linkwise/linear/triplets.hpp"
-#include "linkwise/simulate/given_motion.hpp"
-#include "linkwise/solve/checked_solver.hpp"
 #include "linkwise/solve/registry.hpp"
 #include "linkwise/solve/spectrum.hpp"
-#include "numbers.hpp"
-#include "py_model.hpp"
 #include "report.hpp"
 #include "solver_options.hpp"
+#include "states.hpp"
+#include "table_rows.hpp"
 
 namespace linkwise::bindings {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
+/// States with at most so many leading axes.
+States states_of(const Model& m, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
+                 size_t most_axes) {
+  States s(m, q, v, tau, "tau", external);
+  if (s.lead.size() > most_axes)
+    throw InputError("q has shape " + shape_text(shape_of(s.q.array)) + "; at most " +
+                     std::to_string(most_axes + 1) + " axes are expected");
+  return s;
 }
 
-size_t size(int n) { return static_cast<size_t>(n); }
+BatchInput input_of(const States& states, bool passive) {
+  BatchInput in = states.input();
+  in.passive_acts = passive;
+  return in;
+}
 
-/// One state or several, with rates and torques that may be left out.
-struct StateRows {
-  Argument q, v, tau, external;
-  size_t count;
-  std::vector<double> total_tau, rest;
-
-  StateRows(const Model& m, nb::handle q_, nb::handle v_, nb::handle tau_, nb::handle external_,
-            bool passive, size_t most_axes)
-      : q("q", {size(m.nq())}, q_),
-        v("v", {size(m.nv())}, v_),
-        tau("tau", {size(m.nv())}, tau_),
-        external("external", {size(m.n_joints()), 6}, external_),
-        rest(m.nv()) {
-    if (!q.given) throw InputError("q is missing; give " + std::to_string(m.nq()) + " numbers");
-    const Shape lead = broadcast_leading({&q, &v, &tau, &external});
-    if (lead.size() > most_axes)
-      throw InputError("q has shape " + shape_text(shape_of(q.array)) + "; at most " +
-                       std::to_string(most_axes + 1) + " axes are expected");
-    count = product(lead);
-    total_tau.assign(count * m.nv(), 0.0);
-    for (size_t i = 0; i < count; ++i) {
-      check_quaternions(m, q.data + i * m.nq());
-      double* row = total_tau.data() + i * m.nv();
-      if (tau.given) std::copy(tau.data + i * m.nv(), tau.data + (i + 1) * m.nv(), row);
-      if (passive)
-        add_passive_forces(m, q.data + i * m.nq(), v.given ? v.data + i * m.nv() : rest.data(),
-                           row);
-    }
-  }
-
-  SweepInput<double> input(const Model& m, size_t i) const {
-    SweepInput<double> in;
-    in.q = q.data + i * m.nq();
-    in.v = v.given ? v.data + i * m.nv() : rest.data();
-    in.tau = total_tau.data() + i * m.nv();
-    in.external = external.given ? external.data + i * 6 * m.n_joints() : nullptr;
-    return in;
-  }
-};
-
-/// A f = b of a model at one state. Holds its own copy of the state.
+/// A f = b of a model at one state. Keeps the model alive.
 class PyConstraintSystem {
  public:
   PyConstraintSystem(const PyModel& owner, nb::handle q, nb::handle v, nb::handle tau,
                      nb::handle external, bool passive)
-      : model_(owner.model), system_(*owner.model) {
-    const StateRows rows(*model_, q, v, tau, external, passive, 0);
-    const SweepInput<double> in = rows.input(*model_, 0);
-    keep(q_, in.q, model_->nq());
-    keep(v_, in.v, model_->nv());
-    keep(tau_, in.tau, model_->nv());
-    add_armature_bias(*model_, v_.data(), -1, tau_.data());
-    if (in.external) keep(external_, in.external, 6 * model_->n_joints());
-    system_.assemble(input());
-    check_result(b().data(), b().size());
-    if (!A().all_finite()) refuse_result();
+      : model_(owner.model),
+        system_(*model_, input_of(states_of(*model_, q, v, tau, external, 0), passive)) {
+    if (!system_.finite()) refuse_result();
   }
 
   const BlockTree& A() const { return system_.A(); }
-  const Model& model() const { return *model_; }
-
-  const std::vector<double>& b() const { return system_.b(); }
-  nb::object right_hand_side() const { return read_only(to_numpy(b())); }
+  nb::object b() const { return read_only(to_numpy(system_.b())); }
 
   std::vector<double> unknowns(nb::handle value, const char* name) const {
     const Argument given(name, {size(A().size())}, value);
@@ -115,13 +66,9 @@ class PyConstraintSystem {
   }
 
   double energy_norm(nb::handle x) const {
-    const std::vector<double> f = unknowns(x, "f");
-    std::vector<double> y(f.size());
-    A().multiply(f, y);
-    double sum = 0;
-    for (size_t i = 0; i < f.size(); ++i) sum += f[i] * y[i];
-    check_result(&sum, 1);
-    return std::sqrt(std::max(0.0, sum));
+    const double norm = system_.energy_norm(unknowns(x, "f"));
+    check_result(&norm, 1);
+    return norm;
   }
 
   nb::object dense() const {
@@ -139,33 +86,21 @@ class PyConstraintSystem {
   nb::object sparse() const;
 
   nb::tuple solve(const std::string& solver, nb::handle guess, double tolerance,
-                  const std::string& stop, int max_iterations, nb::handle solver_options) {
-    DynamicsOptions options;
-    options.solver_options.tolerance = tolerance;
-    options.solver_options.stop = stop_rule_from_name(stop);
-    options.solver_options.max_iterations = max_iterations;
-    set_options(options.solver_options, solver_option_values(solver_options));
-    CheckedSolver made(solver, options.solver_options, false);
+                  const std::string& stop, int max_iterations, nb::handle given_options) {
+    const SolverOptions options =
+        make_solver_options(tolerance, stop, max_iterations, solver_option_values(given_options));
     std::vector<double> f =
         guess.is_none() ? std::vector<double>(A().size()) : unknowns(guess, "guess");
-    Report report;
-    {
+    const EvaluationReport report = [&] {
       const GilReleased released;
-      std::vector<double> du(model_->nv());
-      report = made.solve(A(), system_.b(), f, [&](bool with_size) {
-        TreeSystem::Distance found{.with_size = with_size};
-        if (!made.is_direct()) system_.recover(input(), f, du.data(), nullptr, &found);
-        return MotionError{found.gap, found.size};
-      });
-    }
-    const Choice choice{"constraint_force", solver, "as asked for"};
-    const int body = report.node >= 0 ? system_.body_of_node(report.node) : -1;
-    return nb::make_tuple(to_numpy(f), evaluation_report(*model_, choice, {report, body}));
+      return system_.solve(solver, options, f);
+    }();
+    return nb::make_tuple(to_numpy(f), report);
   }
 
   nb::tuple recover(nb::handle f) {
     NewArray du({size(model_->nv())}, {}), loads({size(model_->n_joints()), 6}, {});
-    system_.recover(input(), unknowns(f, "f"), du.data, loads.data);
+    system_.recover(unknowns(f, "f"), du.data, loads.data);
     check_result(du.data, size(model_->nv()));
     check_result(loads.data, size(6 * model_->n_joints()));
     return nb::make_tuple(du.array, loads.array);
@@ -183,21 +118,8 @@ class PyConstraintSystem {
   }
 
  private:
-  static void keep(std::vector<double>& to, const double* from, int n) {
-    to.assign(from, from + n);
-  }
-  SweepInput<double> input() const {
-    SweepInput<double> in;
-    in.q = q_.data();
-    in.v = v_.data();
-    in.tau = tau_.data();
-    in.external = external_.empty() ? nullptr : external_.data();
-    return in;
-  }
-
   std::shared_ptr<const Model> model_;
-  TreeSystem system_;
-  std::vector<double> q_, v_, tau_, external_;
+  ConstraintSystem system_;
 };
 
 nb::object PyConstraintSystem::sparse() const {
@@ -213,37 +135,29 @@ nb::object PyConstraintSystem::sparse() const {
   return array.attr("tocsr")();
 }
 
-/// A dynamics method with its memory of earlier times, and its clock.
+/// Keeps the model alive.
 class PyDynamicsMethod {
  public:
   PyDynamicsMethod(const PyModel& owner, DynamicsOptions options)
-      : model_(owner.model),
-        choice_(choose_dynamics(*owner.model, options)),
-        options_(std::move(options)),
-        method_(make_dynamics(*owner.model, options_)) {}
+      : model_(owner.model), method_(*model_, std::move(options)) {}
 
-  const Choice& choice() const { return choice_; }
+  const Choice& choice() const { return method_.choice(); }
   nb::object constraint_force() const {
-    const std::span<const double> f = method_->constraint_force();
+    const std::span<const double> f = method_.constraint_force();
     return read_only(to_numpy({f.begin(), f.end()}));
   }
-  void reset() { method_ = make_dynamics(*model_, options_); }
+  void reset() { method_.reset(); }
 
   nb::tuple evaluate(double t, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
                      bool passive, bool accept) {
     const Model& m = *model_;
-    const StateRows rows(m, q, v, tau, external, passive, 0);
-    NewArray du({size(m.nv())}, {}), loads({size(m.n_joints()), 6}, {});
-    DynamicsReport report;
-    {
+    const States state = states_of(m, q, v, tau, external, 0);
+    NewArray du({size(m.nv())}, {}), loads({size(m.n_loads()), 6}, {});
+    const EvaluationReport report = [&] {
       const GilReleased released;
-      report = method_->evaluate(t, rows.input(m, 0), du.data, loads.data);
-      if (report.ok() && !(all_finite({du.data, size(m.nv())}) &&
-                           all_finite({loads.data, size(6 * m.n_joints())})))
-        report.outcome = Outcome::not_finite;
-      if (accept && report.ok()) method_->accepted(t);
-    }
-    return nb::make_tuple(du.array, loads.array, evaluation_report(m, choice_, report));
+      return method_.evaluate(t, input_of(state, passive), du.data, loads.data, accept);
+    }();
+    return nb::make_tuple(du.array, loads.array, report);
   }
 
   nb::dict follow(nb::handle times, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
@@ -251,77 +165,56 @@ class PyDynamicsMethod {
 
  private:
   std::shared_ptr<const Model> model_;
-  Choice choice_;
-  DynamicsOptions options_;
-  std::unique_ptr<DynamicsMethod> method_;
+  MethodOverTime method_;
 };
 
 nb::dict PyDynamicsMethod::follow(nb::handle times_in, nb::handle q, nb::handle v, nb::handle tau,
                                   nb::handle external, bool passive, double time_limit) {
   const Model& m = *model_;
-  const StateRows rows(m, q, v, tau, external, passive, 1);
+  const States states = states_of(m, q, v, tau, external, 1);
   const ArrayIn times = as_array(times_in, "times");
-  if (times.ndim() != 1 || times.size() != rows.count)
+  if (times.ndim() != 1 || times.size() != states.count)
     throw InputError("times has shape " + shape_text(shape_of(times)) + " but there are " +
-                     std::to_string(rows.count) + " states");
-  NewArray du({rows.count}, {size(m.nv())});
+                     std::to_string(states.count) + " states");
+  NewArray du({states.count}, {size(m.nv())});
+  const std::vector<MethodOverTime::Step> steps = without_gil([&](const GoOn& go_on) {
+    return method_.follow({times.data(), times.size()}, input_of(states, passive), du.data,
+                          time_limit, go_on);
+  });
   std::vector<double> seconds, iterations, errors;
-  std::vector<Outcome> outcomes;
+  nb::list outcomes;
   bool bounds = true;
-  Interrupt interrupt;
-  {
-    const GilReleased released;
-    const Clock::time_point begin = Clock::now();
-    for (size_t i = 0; i < rows.count && !interrupt(); ++i) {
-      const SweepInput<double> in = rows.input(m, i);
-      const Clock::time_point started = Clock::now();
-      DynamicsReport report = method_->evaluate(times.data()[i], in, du.data + i * m.nv(), nullptr);
-      if (report.ok() && !all_finite({du.data + i * m.nv(), size(m.nv())}))
-        report.outcome = Outcome::not_finite;
-      seconds.push_back(seconds_since(started));
-      iterations.push_back(report.iterations);
-      errors.push_back(report.error_estimate);
-      bounds &= report.error_is_bound;
-      outcomes.push_back(report.outcome);
-      method_->accepted(times.data()[i]);
-      if (seconds_since(begin) > time_limit) break;
-    }
+  for (const MethodOverTime::Step& step : steps) {
+    seconds.push_back(step.seconds);
+    iterations.push_back(step.iterations);
+    errors.push_back(step.error_estimate);
+    outcomes.append(std::string(to_string(step.outcome)));
+    bounds &= step.error_is_bound;
   }
-  interrupt.rethrow();
-  nb::list names;
-  for (Outcome outcome : outcomes) names.append(std::string(to_string(outcome)));
   nb::dict out;
   out["acceleration"] =
-      nb::cast(du.array)[nb::slice(nb::int_(0), nb::int_(outcomes.size()), nb::int_(1))];
+      nb::cast(du.array)[nb::slice(nb::int_(0), nb::int_(steps.size()), nb::int_(1))];
   out["seconds"] = to_numpy(seconds);
   out["iterations"] = nb::cast(to_numpy(iterations)).attr("astype")("int64");
   out["error_estimate"] = to_numpy(errors);
   out["error_is_bound"] = bounds;
-  out["outcome"] = names;
+  out["outcome"] = outcomes;
   return out;
 }
 
 nb::list initial_guess_list() {
-  nb::list out;
-  for (const InitialGuessEntry& e : initial_guess_table()) {
-    nb::dict d;
-    d["name"] = std::string(e.name);
-    d["description"] = std::string(e.description);
-    d["reference"] = std::string(e.reference);
-    out.append(d);
-  }
-  return out;
+  return table_rows(initial_guess_table(), [](auto&& row, const InitialGuessEntry& e) {
+    row("name", e.name);
+    row("description", e.description);
+    row("reference", e.reference);
+  });
 }
 
 nb::list stop_rule_list() {
-  nb::list out;
-  for (const StopRuleEntry& e : stop_rule_table()) {
-    nb::dict d;
-    d["name"] = std::string(e.name);
-    d["description"] = std::string(e.description);
-    out.append(d);
-  }
-  return out;
+  return table_rows(stop_rule_table(), [](auto&& row, const StopRuleEntry& e) {
+    row("name", e.name);
+    row("description", e.description);
+  });
 }
 
 void bind_spectrum(nb::module_& m) {
@@ -346,6 +239,7 @@ void bind_spectrum(nb::module_& m) {
 }
 
 void bind_system(nb::module_& m) {
+  const SolverOptions usual = evaluation_options().solver_options;
   nb::class_<PyConstraintSystem>(
       m, "ConstraintSystem",
       R"(The system A f = b of a model's joint constraint forces at one state [sharf1993].
@@ -366,15 +260,10 @@ the joint constrains directions. f holds forces [N] and moments [N m], b relativ
           "size", [](const PyConstraintSystem& s) { return s.A().size(); },
           "Number of unknowns: constrained directions of all joints.")
       .def_prop_ro(
-          "b", &PyConstraintSystem::right_hand_side, nb::rv_policy::move,
+          "b", &PyConstraintSystem::b, nb::rv_policy::move,
           R"(Right-hand side (size,) [m/s2, rad/s2]: what the joints would open by without f.)")
       .def_prop_ro(
-          "rows_per_joint",
-          [](const PyConstraintSystem& s) {
-            nb::list out;
-            for (int n : s.A().dim) out.append(n);
-            return out;
-          },
+          "rows_per_joint", [](const PyConstraintSystem& s) { return s.A().dim; },
           R"(Constrained directions of each body's inboard joint, in the order of the rows of A.)")
       .def("rows", &PyConstraintSystem::rows, "joint"_a,
            R"(Slice of f that belongs to a joint, given by its name; InputError for unknown
@@ -389,8 +278,9 @@ shape.)")
            R"(sqrt(f^T A f) of f (size,) [N, N m]: for an error in f the kinetic-energy norm of the
 acceleration error. InputError for another shape.)")
       .def("solve", &PyConstraintSystem::solve, "solver"_a = "thomas", nb::kw_only(),
-           "guess"_a = nb::none(), "tolerance"_a = 1e-12, "stop"_a = "energy_norm",
-           "max_iterations"_a = 0, "solver_options"_a = nb::none(),
+           "guess"_a = nb::none(), "tolerance"_a = usual.tolerance,
+           "stop"_a = std::string(to_string(usual.stop)), "max_iterations"_a = usual.max_iterations,
+           "solver_options"_a = nb::none(),
            R"(Solves A f = b.
 
 Args:
@@ -427,30 +317,29 @@ many as needed.)")
 
 void make_method(PyDynamicsMethod* self, const PyModel& model, const std::string& method,
                  const std::string& solver, const std::string& guess, double tolerance,
-                 const std::string& stop, int max_iterations, nb::handle solver_options,
+                 const std::string& stop, int max_iterations, nb::handle given_options,
                  nb::handle threads) {
-  DynamicsOptions options;
-  options.executor = executor_for(whole_number(threads, "threads"));
-  options.method = method;
-  options.solver = solver;
-  options.initial_guess = guess;
-  options.solver_options.tolerance = tolerance;
-  options.solver_options.stop = stop_rule_from_name(stop);
-  options.solver_options.max_iterations = max_iterations;
-  set_options(options.solver_options, solver_option_values(solver_options));
-  refuse_loops(*model.model, "DynamicsMethod", "use forward_dynamics");
-  new (self) PyDynamicsMethod(model, std::move(options));
+  new (self) PyDynamicsMethod(
+      model, {.method = method,
+              .solver = solver,
+              .initial_guess = guess,
+              .executor = executor_for(whole_number(threads, "threads")),
+              .solver_options = make_solver_options(tolerance, stop, max_iterations,
+                                                    solver_option_values(given_options))});
 }
 
 void bind_dynamics_method(nb::module_& m) {
+  const DynamicsOptions usual = MethodOverTime::usual_options();
   nb::class_<PyDynamicsMethod>(
       m, "DynamicsMethod",
       R"(A method of forward dynamics with its memory: an iterative solver starts from the
 solutions of earlier times, as in a simulation. linkwise.forward_dynamics remembers nothing.)")
-      .def("__init__", &make_method, "model"_a, nb::kw_only(), "method"_a = "auto",
-           "solver"_a = "auto", "initial_guess"_a = "cubic", "tolerance"_a = 1e-7,
-           "stop"_a = "energy_norm", "max_iterations"_a = 0, "solver_options"_a = nb::none(),
-           "threads"_a = nb::none(),
+      .def("__init__", &make_method, "model"_a, nb::kw_only(), "method"_a = usual.method,
+           "solver"_a = usual.solver, "initial_guess"_a = usual.initial_guess,
+           "tolerance"_a = usual.solver_options.tolerance,
+           "stop"_a = std::string(to_string(usual.solver_options.stop)),
+           "max_iterations"_a = usual.solver_options.max_iterations,
+           "solver_options"_a = nb::none(), "threads"_a = nb::none(),
            R"(Args:
     model: the machine.
     method, solver: names of linkwise.methods() and linkwise.solvers(); "auto" chooses.

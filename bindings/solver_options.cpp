@@ -4,6 +4,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/solve/registry.hpp"
+#include "table_rows.hpp"
 
 namespace linkwise::bindings {
 namespace {
@@ -41,24 +42,12 @@ SolverOptionValues solver_option_values(nb::handle given) {
 }
 
 nb::list solver_option_list() {
-  nb::list out;
-  for (const SolverOption& known : solver_options()) {
-    const Option& option = *known.option;
-    const std::string owners = known.owners.empty() ? "" : known.owners + ": ";
-    nb::dict entry;
-    entry["name"] = std::string(option.name);
-    entry["default"] = std::visit(
-        [](auto fallback) {
-          if constexpr (std::is_same_v<decltype(fallback), std::string_view>)
-            return nb::object(nb::cast(std::string(fallback)));
-          else
-            return nb::object(nb::cast(fallback));
-        },
-        option.fallback);
-    entry["description"] = owners + std::string(option.text);
-    out.append(entry);
-  }
-  return out;
+  return table_rows(solver_options(), [](auto&& row, const SolverOption& known) {
+    row("name", known.option->name);
+    std::visit([&](const auto& fallback) { row("default", fallback); }, known.option->fallback);
+    row("description",
+        (known.owners.empty() ? "" : known.owners + ": ") + std::string(known.option->text));
+  });
 }
 
 }  // namespace linkwise::bindings

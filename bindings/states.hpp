@@ -27,7 +27,6 @@ struct States {
                        ")");
     lead = broadcast_leading({&q, &v, &tau, &external, &prescribed});
     count = product(lead);
-    if (external.given) check_external(m);
     for (size_t i = 0; i < count; ++i) check_quaternions(m, q.data + i * m.nq());
   }
 
@@ -40,21 +39,6 @@ struct States {
     in.external = external.data;
     in.du = prescribed.data;
     return in;
-  }
-
- private:
-  /// A link without mass between two joints is no body: nothing would ask for its row.
-  void check_external(const Model& m) const {
-    for (int j = 0; j < m.n_joints(); ++j) {
-      if (m.joints[j].last_of_body) continue;
-      for (size_t i = 0; i < count; ++i) {
-        const double* w = external.data + 6 * (i * size(m.n_joints()) + size(j));
-        if (std::any_of(w, w + 6, [](double x) { return x != 0; }))
-          throw InputError("external: link '" + m.links[m.joints[j].link].name + "'" + m.where() +
-                           " between two joints has no mass, so no wrench can act on it; apply it "
-                           "to the next body outboard");
-      }
-    }
   }
 };
 

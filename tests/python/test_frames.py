@@ -288,7 +288,7 @@ def test_a_wrench_on_a_link_without_mass_between_joints_is_refused():
     for call in (lw.joint_loads, lw.forward_dynamics):
         with pytest.raises(lw.InputError, match="link 'cross' between two joints has no mass"):
             call(model, q, q, q, external=outside)
-    with pytest.raises(lw.InputError, match="'cross' has no mass, so no wrench can act on it"):
+    with pytest.raises(lw.InputError, match="link 'cross' between two joints has no mass"):
         lw.simulate(model, duration=0.1, wrenches={"cross": [0, 1, 0, 0, 0, 0]})
     assert lw.joint_loads(model, q, q, q, external=np.zeros((2, 6))).shape == (2, 6)
 

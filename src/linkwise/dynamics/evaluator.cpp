@@ -2,16 +2,13 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
-#include <optional>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/base/finite.hpp"
+#include "linkwise/base/memory.hpp"
 #include "linkwise/constraint/joint_constraint.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/parts.hpp"
-#include "linkwise/forces/passive.hpp"
-#include "linkwise/kinematics/loop_states.hpp"
 #include "linkwise/solve/direct/direct_solver.hpp"
 
 namespace linkwise {
@@ -21,41 +18,18 @@ constexpr std::pair<std::string_view, Cause> causes[] = {
     {"gravity", Cause::gravity}, {"velocity", Cause::velocity}, {"drive", Cause::drive},
     {"motion", Cause::motion},   {"passive", Cause::passive},   {"external", Cause::external}};
 
-void check_external(const Model& m, size_t count, const BatchInput& s) {
-  if (!s.external) return;
-  for (int j = 0; j < m.n_joints(); ++j) {
-    if (m.joints[j].last_of_body) continue;
-    for (size_t i = 0; i < count; ++i)
-      for (int k = 0; k < 6; ++k)
-        if (s.external[(i * m.n_joints() + j) * 6 + k] != 0)
-          throw InputError(
-              "body '" + m.links[m.joints[j].link].name + "'" + m.where() +
-              " has no mass, so no wrench can act on it; apply it to the next body outboard");
-  }
-}
-
-void check(const Model& m, size_t count, const BatchInput& s) {
-  check_external(m, count, s);
-  if (!std::isfinite(s.gravity_factor))
-    throw InputError("gravity is not finite; give a factor, 1 for the model's gravity, 0 for none");
-}
-
 void check_prescribed(const Model& m, const BatchInput& s) {
   if (s.du && m.spec().prescribed.empty())
     throw InputError(
         "prescribed: the model has no joint of given motion; use model.prescribe([...])");
 }
 
-/// tau, null for none, with the model's passive forces added, one row per state.
-std::vector<double> with_passive(const Model& m, size_t count, const BatchInput& s,
-                                 const double* tau) {
-  std::vector<double> total(count * m.nv());
-  if (tau) std::copy(tau, tau + total.size(), total.begin());
-  const std::vector<double> rest(m.nv());
-  for (size_t i = 0; i < count; ++i)
-    add_passive_forces(m, s.q + i * m.nq(), s.v ? s.v + i * m.nv() : rest.data(),
-                       total.data() + i * m.nv());
-  return total;
+/// Room for the results, which are still to be written, and for torques that are not given.
+void check_room(const Model& m, size_t count, const BatchInput& s, const ForwardOutput& out) {
+  const bool scratch = s.passive_acts || !s.tau;
+  const double numbers = (scratch ? 2.0 : 1.0) * m.nv() + (out.joint_load ? 6.0 * m.n_loads() : 0);
+  if (8 * count * numbers > worth_a_check)
+    require_memory(8 * count * numbers, "forward dynamics of " + std::to_string(count) + " states");
 }
 
 /// How the parts went, whatever their order in time: of the bodies at which some failed, the one
@@ -85,51 +59,16 @@ bool rows_finite(const double* results, size_t first, size_t rows, size_t width)
   return !results || all_finite({results + first * width, rows * width});
 }
 
-/// What joints that close loops add to a state's input. InputError where it leaves one open.
-class LoopInput {
- public:
-  LoopInput(const Model& model, const BatchInput& s, size_t count)
-      : model_(model), states_(model), passive_(s.passive_acts), several_(count > 1) {}
-
-  void add(size_t i, SweepInput<double>& in) {
-    states_.update(in);
-    const std::string where = several_ ? "state " + std::to_string(i) + ": " : "";
-    require_closed(model_, states_, where);
-    require_coupled(model_, in.q, in.v, where);
-    if (!passive_) return;
-    tau_.assign(model_.loops.nv, 0.0);
-    add_passive_forces(model_.loops, states_.q().data(), states_.v().data(), tau_.data());
-    in.loop_tau = tau_.data();
-  }
-
- private:
-  const Model& model_;
-  LoopStates states_;
-  bool passive_, several_;
-  std::vector<double> tau_;
-};
-
 /// Every state by one method, one after the other.
-void one_by_one(const Model& m, DynamicsMethod& method, size_t count, const BatchInput& s,
+void one_by_one(const Model& m, DynamicsMethod& method, size_t count, AppliedStates& states,
                 const ForwardOutput& out, DynamicsReport& report, const GoOn& go_on) {
-  const std::vector<double> zero(m.nv());
   const size_t n_load = 6 * static_cast<size_t>(m.n_loads());
   const auto finite = [&](size_t i) {
     return rows_finite(out.acceleration, i, 1, m.nv()) && rows_finite(out.joint_load, i, 1, n_load);
   };
-  std::optional<LoopInput> loops;
-  if (m.is_constrained()) loops.emplace(m, s, count);
   for (size_t i = 0; i < count && go_on(); ++i) {
-    SweepInput<double> in;
-    in.q = s.q + i * m.nq();
-    in.v = s.v ? s.v + i * m.nv() : zero.data();
-    in.tau = s.tau ? s.tau + i * m.nv() : zero.data();
-    in.external = s.external ? s.external + i * 6 * m.n_joints() : nullptr;
-    in.prescribed = s.du ? s.du + i * m.nv() : zero.data();
-    in.gravity_factor = s.gravity_factor;
-    if (loops) loops->add(i, in);
     const DynamicsReport r =
-        method.evaluate(0, in, out.acceleration + i * m.nv(),
+        method.evaluate(0, states[i], out.acceleration + i * m.nv(),
                         out.joint_load ? out.joint_load + i * n_load : nullptr);
     report.loops = r.loops;
     report.iterations = std::max(report.iterations, r.iterations);
@@ -303,22 +242,17 @@ EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& sta
                                              const DynamicsOptions& options,
                                              const ForwardOutput& out, const GoOn& go_on) const {
   const Model& m = *model_;
-  check(m, count, states);
   check_prescribed(m, states);
   require_determined(m);
+  check_room(m, count, states, out);
+  AppliedStates applied(m, count, states);
+  const BatchInput& s = applied.rows();
   DynamicsReport report;
   Choice choice;
   Lease workspace(*this);
   const Pick picked = pick(*workspace, count, options, out.constraint_force != nullptr, choice);
-  BatchInput s = states;
-  std::vector<double> torques;
-  if (states.passive_acts && m.has_passive_forces())
-    torques = with_passive(m, count, states, states.tau);
-  else if (!states.tau)
-    torques.assign(count * m.nv(), 0.0);
-  if (!torques.empty()) s.tau = torques.data();
   if (picked.method) {
-    one_by_one(m, *picked.method, count, s, out, report, go_on);
+    one_by_one(m, *picked.method, count, applied, out, report, go_on);
     return evaluation_report(m, std::move(choice), report);
   }
   PartsReport parts;
@@ -343,7 +277,7 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
                                            const Executor& executor, double* loads,
                                            const GoOn& go_on) const {
   const Model& m = *model_;
-  check(m, count, states);
+  check_states(m, count, states);
   check_prescribed(m, states);
   require_determined(m);
   if (method != "articulated_body" && method != "constraint_force")
@@ -356,7 +290,7 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
   BatchInput s = states;
   std::vector<double> passive;
   if (std::find(causes.begin(), causes.end(), Cause::passive) != causes.end()) {
-    passive = with_passive(m, count, states, nullptr);
+    passive = with_passive_forces(m, count, states, nullptr);
     s.passive = passive.data();
   }
   const size_t width = causes.size() * 6 * m.n_joints();
@@ -377,7 +311,7 @@ void Evaluator::inverse_dynamics(size_t count, const BatchInput& states, const E
                                  double* tau, double* loads, const GoOn& go_on) const {
   const Model& m = *model_;
   refuse_loops(m, "inverse dynamics");
-  check(m, count, states);
+  check_states(m, count, states);
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);
     workspace->batch.inverse_dynamics(n, states.from(m, first),

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "linkwise/dynamics/applied_states.hpp"
 #include "linkwise/dynamics/batch.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
 #include "linkwise/dynamics/parts.hpp"

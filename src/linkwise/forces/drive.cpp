@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "linkwise/base/error.hpp"
 #include "linkwise/forces/coordinate_forces.hpp"
 
 namespace linkwise {
@@ -116,6 +117,12 @@ Breakpoints breakpoints(const Wrench& wrench, double tolerance, double largest) 
   const TableAction action{.least = rounding_share * largest};
   if (wrench.table) return find_breakpoints(*wrench.table, action, tolerance);
   return of_function(wrench.course, action, tolerance);
+}
+
+void refuse_wrench(const Model& model, int joint) {
+  throw InputError("link '" + model.links[model.joints[joint].link].name + "'" + model.where() +
+                   " between two joints has no mass, so no wrench can act on it; apply it to the "
+                   "next body outboard");
 }
 
 void add_wrenches(const Model&, const std::vector<Wrench>& wrenches, double t, const double* poses,

@@ -69,6 +69,9 @@ Breakpoints breakpoints(const Wrench& wrench, double tolerance, double largest);
 double largest_action(const Drive& drive);
 double largest_action(const Wrench& wrench);
 
+/// InputError about a wrench on the child link of a joint where that is no body.
+[[noreturn]] void refuse_wrench(const Model& model, int joint);
+
 /// Adds the wrenches to external [n_joints][6], at and in the joints' outboard frames.
 void add_wrenches(const Model& model, const std::vector<Wrench>& wrenches, double t,
                   const double* poses, double* external);

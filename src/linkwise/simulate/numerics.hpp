@@ -33,6 +33,12 @@ struct NumericsEntry {
       member;
   std::string_view description;
   std::string_view units = "";
+
+  /// What is given: a number, a count or a name.
+  std::string_view kind() const {
+    constexpr std::string_view kinds[] = {"number", "number", "count", "name"};
+    return kinds[member.index()];
+  }
 };
 
 std::span<const NumericsEntry> numerics_table();

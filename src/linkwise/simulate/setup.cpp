@@ -37,11 +37,7 @@ void Setup::set_drive(int joint, Drive drive) {
 }
 
 void Setup::add_wrench(Wrench wrench) {
-  const JointInfo& info = model->joints[wrench.joint];
-  if (!info.last_of_body)
-    throw InputError(
-        "body '" + model->links[info.link].name + "'" + model->where() +
-        " has no mass, so no wrench can act on it; apply it to the next body outboard");
+  if (!model->joints[wrench.joint].last_of_body) refuse_wrench(*model, wrench.joint);
   wrenches.push_back(std::move(wrench));
   settled_ = false;
 }

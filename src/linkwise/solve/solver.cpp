@@ -17,7 +17,7 @@ bool positive(double x) { return x > 0.0; }
 
 constexpr Option common[] = {
     {.name = "tolerance",
-     .fallback = 1e-7,
+     .fallback = usual_tolerance,
      .text = "what the stop rule compares with",
      .accepts = positive,
      .wanted = "give a number above 0"},
@@ -44,9 +44,9 @@ std::string_view to_string(StopRule rule) { return stop_rules[static_cast<int>(r
 
 StopRule stop_rule_from_name(std::string_view name) {
   std::string known;
-  for (StopRule rule : {StopRule::paper, StopRule::residual, StopRule::energy_norm}) {
-    if (to_string(rule) == name) return rule;
-    known += (known.empty() ? " " : ", ") + std::string(to_string(rule));
+  for (size_t i = 0; i < std::size(stop_rules); ++i) {
+    if (stop_rules[i].name == name) return static_cast<StopRule>(i);
+    known += (known.empty() ? " " : ", ") + std::string(stop_rules[i].name);
   }
   throw InputError("unknown stop rule '" + std::string(name) + "'; known are" + known);
 }
@@ -66,6 +66,16 @@ void SolverOptions::set(std::string_view name, OptionValue value) {
     stop = stop_rule_from_name(std::get<std::string>(value));
   else
     own.set(option, std::move(value));
+}
+
+SolverOptions make_solver_options(double tolerance, std::string_view stop, int max_iterations,
+                                  const SolverOptionValues& values) {
+  SolverOptions options;
+  options.tolerance = tolerance;
+  options.stop = stop_rule_from_name(stop);
+  options.max_iterations = max_iterations;
+  set_options(options, values);
+  return options;
 }
 
 void set_options(SolverOptions& options, const SolverOptionValues& values) {

@@ -37,10 +37,12 @@ struct EnergyBound {
   double absolute = 0.0;  ///< in the units of sqrt(x^T A x)
 };
 
+inline constexpr double usual_tolerance = 1e-7;
+
 struct SolverOptions {
   /// Relative tolerance of the stop rule. A simulation passes a tenth of its own tolerance, as the
   /// paper and SUNDIALS do. Direct solvers ignore it.
-  double tolerance = 1e-7;
+  double tolerance = usual_tolerance;
   /// Added to the energy-norm rule's bound, in the units of sqrt(x^T A x): for constraint forces
   /// the square root of (twice the kinetic energy of an acceleration).
   double absolute_tolerance = 0.0;
@@ -65,6 +67,9 @@ struct SolverOptions {
 using SolverOptionValues = std::vector<std::pair<std::string, OptionValue>>;
 /// Sets and validates them all.
 void set_options(SolverOptions& options, const SolverOptionValues& values);
+/// What every solver is told, then further options, which go first.
+SolverOptions make_solver_options(double tolerance, std::string_view stop, int max_iterations,
+                                  const SolverOptionValues& values);
 
 /// The options that every solver has, by name.
 std::span<const Option> common_options();

@@ -152,8 +152,8 @@ TEST(Refused, EachWithOneLine) {
             "joint 'joint2' of arm.urdf: a pd drive needs angles or distances, not a quaternion; "
             "drive it by torque");
   EXPECT_EQ(error_of([&] { simulation.add_wrench({}); }),
-            "body 'link0' of arm.urdf has no mass, so no wrench can act on it; apply it to the "
-            "next body outboard");
+            "link 'link0' of arm.urdf between two joints has no mass, so no wrench can act on it; "
+            "apply it to the next body outboard");
   std::vector<double> q = model->neutral_configuration(), v(5);
   q.back() = 0;
   EXPECT_EQ(error_of([&] {

@@ -1,0 +1,86 @@
+#include "linkwise/dynamics/applied_states.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/forces/drive.hpp"
+#include "linkwise/forces/passive.hpp"
+#include "linkwise/kinematics/loop_states.hpp"
+
+namespace linkwise {
+
+void check_states(const Model& m, size_t count, const BatchInput& s) {
+  for (int j = 0; s.external && j < m.n_joints(); ++j) {
+    if (m.joints[j].last_of_body) continue;
+    for (size_t i = 0; i < count; ++i)
+      for (int k = 0; k < 6; ++k)
+        if (s.external[(i * m.n_joints() + j) * 6 + k] != 0) refuse_wrench(m, j);
+  }
+  if (!std::isfinite(s.gravity_factor))
+    throw InputError("gravity is not finite; give a factor, 1 for the model's gravity, 0 for none");
+}
+
+std::vector<double> with_passive_forces(const Model& m, size_t count, const BatchInput& s,
+                                        const double* tau) {
+  std::vector<double> total(count * m.nv());
+  if (tau) std::copy(tau, tau + total.size(), total.begin());
+  const std::vector<double> rest(m.nv());
+  for (size_t i = 0; i < count; ++i)
+    add_passive_forces(m, s.q + i * m.nq(), s.v ? s.v + i * m.nv() : rest.data(),
+                       total.data() + i * m.nv());
+  return total;
+}
+
+/// What joints that close loops add to a state's input. InputError where it leaves one open.
+class AppliedStates::Loops {
+ public:
+  Loops(const Model& model, const BatchInput& s, size_t count)
+      : model_(model), states_(model), passive_(s.passive_acts), several_(count > 1) {}
+
+  void add(size_t i, SweepInput<double>& in) {
+    states_.update(in);
+    const std::string where = several_ ? "state " + std::to_string(i) + ": " : "";
+    require_closed(model_, states_, where);
+    require_coupled(model_, in.q, in.v, where);
+    if (!passive_) return;
+    tau_.assign(model_.loops.nv, 0.0);
+    add_passive_forces(model_.loops, states_.q().data(), states_.v().data(), tau_.data());
+    in.loop_tau = tau_.data();
+  }
+
+ private:
+  const Model& model_;
+  LoopStates states_;
+  bool passive_, several_;
+  std::vector<double> tau_;
+};
+
+AppliedStates::AppliedStates(const Model& model, size_t count, const BatchInput& states)
+    : model_(&model), rows_(states), rest_(states.v ? 0 : model.nv()) {
+  check_states(model, count, states);
+  if (states.passive_acts && model.has_passive_forces())
+    torques_ = with_passive_forces(model, count, states, states.tau);
+  else if (!states.tau)
+    torques_.assign(count * model.nv(), 0.0);
+  if (!torques_.empty()) rows_.tau = torques_.data();
+  if (model.is_constrained()) loops_ = std::make_unique<Loops>(model, states, count);
+}
+
+AppliedStates::~AppliedStates() = default;
+
+SweepInput<double> AppliedStates::operator[](size_t i) {
+  const BatchInput row = rows_.from(*model_, i);
+  SweepInput<double> in;
+  in.q = row.q;
+  in.v = row.v ? row.v : rest_.data();
+  in.tau = row.tau;
+  in.external = row.external;
+  in.prescribed = row.du;
+  in.gravity_factor = row.gravity_factor;
+  if (loops_) loops_->add(i, in);
+  return in;
+}
+
+}  // namespace linkwise

@@ -1,0 +1,43 @@
+#pragma once
+// States of a model as they come from outside, with all that acts on them.
+#include <memory>
+#include <vector>
+
+#include "linkwise/dynamics/batch.hpp"
+#include "linkwise/kinematics/sweep_input.hpp"
+
+namespace linkwise {
+
+/// InputError where a wrench acts on a link that is no body, or the factor of gravity is not
+/// finite.
+void check_states(const Model& model, size_t count, const BatchInput& states);
+
+/// tau [count][nv], null for none, with the model's passive forces in the states added.
+std::vector<double> with_passive_forces(const Model& model, size_t count, const BatchInput& states,
+                                        const double* tau);
+
+/// Rates and torques that were left out are zero, the model's passive forces are among the torques
+/// where they act. The arrays of `states` must outlive it. InputError as check_states().
+class AppliedStates {
+ public:
+  AppliedStates(const Model& model, size_t count, const BatchInput& states);
+  ~AppliedStates();
+  AppliedStates(const AppliedStates&) = delete;
+  AppliedStates& operator=(const AppliedStates&) = delete;
+
+  /// State i, for a sweep; it holds until the next one is asked for. InputError where it leaves a
+  /// loop open.
+  SweepInput<double> operator[](size_t i);
+  /// All of them; rates may still be null.
+  const BatchInput& rows() const { return rows_; }
+
+ private:
+  class Loops;
+
+  const Model* model_;
+  BatchInput rows_;
+  std::vector<double> torques_, rest_;
+  std::unique_ptr<Loops> loops_;
+};
+
+}  // namespace linkwise
