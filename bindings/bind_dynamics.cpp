@@ -5,6 +5,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "bind.hpp"
+#include "doc_text.hpp"
 #include "linkwise/dynamics/assembly.hpp"
 #include "linkwise/integrate/integrator.hpp"
 #include "linkwise/solve/registry.hpp"
@@ -225,54 +226,32 @@ void bind_forward(nb::module_& m) {
       "tolerance"_a = nb::none(), "stop"_a = nb::none(), "max_iterations"_a = nb::none(),
       "solver_options"_a = nb::none(), "threads"_a = nb::none(), "full"_a = false,
       "gravity"_a = 1.0, "prescribed"_a = nb::none(),
-      R"(Accelerations that torques cause, by the method asked for.
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
-        tau: joint torques and forces (..., nv) [N m, N], None: zero. Leading axes broadcast.
-    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
-        point, in its joint frame, force first; None: no wrench.
-    passive: adds the model's damping, friction, springs and stops to tau.
-    method, solver: names as in linkwise.methods() and linkwise.solvers(), which cite their
+      doc::text(
+          "Accelerations that torques cause, by the method asked for.",
+          {doc::q_v_tau, doc::external, doc::passive,
+           R"(    method, solver: names as in linkwise.methods() and linkwise.solvers(), which cite their
         sources; "auto" chooses.
-    tolerance, stop, max_iterations: of iterative solvers; None: 1e-12 by the energy norm.
+    tolerance, stop, max_iterations: of iterative solvers; None: as of ConstraintSystem.solve.
     solver_options: further options by name, as in linkwise.solver_options(); they go first.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
     full: return everything.
-    gravity: factor on the model's gravity, 0 leaves it out.
-    prescribed: accelerations (..., nv) of the joints of Model.prescribe; the others are not read.
-
-Returns:
-    dv/dt (..., nv) [rad/s2, m/s2]; with full a ForwardDynamicsResult.
-
-Raises:
-    InputError: a name is unknown, shapes do not fit the model, or a number is not finite.
-    NumericsError: the method failed; not with full, whose report says so.)");
+)",
+           doc::gravity, doc::prescribed},
+          "    dv/dt (..., nv) [rad/s2, m/s2]; with full a ForwardDynamicsResult.",
+          R"(a name is unknown, shapes do not fit the model, or a number is not finite.
+    NumericsError: the method failed; not with full, whose report says so.)")
+          .c_str());
 }
 
 void bind_inverse(nb::module_& m) {
   const auto of_motion = [&](const char* name, auto function, const std::string& title,
-                             const std::string& returns) {
-    const std::string doc = title +
-                            R"( of a given motion, by the recursion of Newton and Euler [luh1980].
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
-        acceleration: dv/dt (..., nv) [rad/s2, m/s2], None: zero. Leading axes broadcast.
-    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
-        point, in its joint frame, force first; None: no wrench.
-    gravity: factor on the model's gravity, 0 leaves it out.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-)" + returns + R"(
-
-Raises:
-    InputError: shapes do not fit the model, or a number is not finite.)";
-    m.def(name, function, "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
-          "external"_a = nb::none(), "gravity"_a = 1.0, "threads"_a = nb::none(), doc.c_str());
+                             const char* returns) {
+    m.def(
+        name, function, "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
+        "external"_a = nb::none(), "gravity"_a = 1.0, "threads"_a = nb::none(),
+        doc::text(
+            (title + " of a given motion, by the recursion of Newton and Euler [luh1980].").c_str(),
+            {doc::q_v_acceleration, doc::external, doc::gravity}, returns)
+            .c_str());
   };
   of_motion(
       "inverse_dynamics",
@@ -290,30 +269,21 @@ Raises:
         return inverse_dynamics(self, q, v, a, external, gravity, threads, true);
       },
       "Joint loads", "    (..., n_joints + n_loops, 6) [N, N m]: as of joint_loads.");
-  m.def("joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
-        nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
-        "solver"_a = "auto", "threads"_a = nb::none(),
-        R"(Joint loads of the motion that torques cause: w_n = M_n a_n + p_n + the loads outboard
-[luh1980].
-
-Args:
-    model: the machine.
-    q: positions (..., nq) [rad, m]; v: rates (..., nv) [rad/s, m/s], None: at rest;
-        tau: joint torques and forces (..., nv) [N m, N], None: zero. Leading axes broadcast.
-    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
-        point, in its joint frame, force first; None: no wrench.
-    passive: adds the model's damping, friction, springs and stops to tau.
-    method, solver: as of forward_dynamics.
-    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.
-
-Returns:
-    (..., n_joints + n_loops, 6) [N, N m]: the wrench that the inboard body exerts on the outboard
+  m.def(
+      "joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
+      nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
+      "solver"_a = "auto", "threads"_a = nb::none(),
+      doc::text(
+          R"(Joint loads of the motion that torques cause: w_n = M_n a_n + p_n + the loads outboard
+[luh1980].)",
+          {doc::q_v_tau, doc::external, doc::passive,
+           "    method, solver: as of forward_dynamics.\n"},
+          R"(    (..., n_joints + n_loops, 6) [N, N m]: the wrench that the inboard body exerts on the outboard
     body through the joint, drive and passive forces included, at the joint point, in the joint frame
-    of the outboard body, force first.
-
-Raises:
-    InputError: a name is unknown, shapes do not fit the model, or a number is not finite.
-    NumericsError: the method failed.)");
+    of the outboard body, force first.)",
+          R"(a name is unknown, shapes do not fit the model, or a number is not finite.
+    NumericsError: the method failed.)")
+          .c_str());
 }
 
 }  // namespace

@@ -9,11 +9,14 @@
 namespace linkwise::bindings {
 namespace {
 
-void check_table(const ArrayIn& t, const ArrayIn& y, size_t columns) {
-  if (t.ndim() != 1 || t.shape(0) < 2)
-    throw InputError("times has shape " + shape_text(shape_of(t)) +
-                     "; a table needs at least two times");
-  const size_t n = t.shape(0);
+/// Values over time as piecewise polynomials; cubic ones are SciPy's not-a-knot splines, but
+/// for three rows, where SciPy solves for the parabola and warns if the times are very uneven.
+Table make_table(nb::handle times, nb::handle values, const std::string& interpolation,
+                 size_t columns) {
+  const ArrayIn t = as_array(times, "times");
+  const ArrayIn y = as_array(values, "values");
+  const size_t n = t.size();
+  if (t.ndim() != 1) throw InputError("times has shape " + shape_text(shape_of(t)) + "; give (n,)");
   const bool flat = y.ndim() == 1 && columns == 1;
   if (!flat && (y.ndim() != 2 || y.shape(1) != columns))
     throw InputError("values has shape " + shape_text(shape_of(y)) + " but shape (" +
@@ -21,68 +24,16 @@ void check_table(const ArrayIn& t, const ArrayIn& y, size_t columns) {
   if (y.shape(0) != n)
     throw InputError("values has " + std::to_string(y.shape(0)) + " rows but there are " +
                      std::to_string(n) + " times");
-  for (size_t i = 0; i < n * columns; ++i)
-    if (!std::isfinite(y.data()[i]))
-      throw InputError("values is not finite in row " + std::to_string(i / columns));
-  for (size_t i = 0; i < n; ++i)
-    if (!std::isfinite(t.data()[i]) || (i > 0 && !(t.data()[i] > t.data()[i - 1])))
-      throw InputError("times is not increasing at row " + std::to_string(i) +
-                       "; sort the table by time and remove repeated times");
-}
-
-/// The parabola through three samples, which is the not-a-knot spline of so few. SciPy solves for
-/// it and warns where the times are very uneven.
-void add_parabola(const double* t, const double* y, size_t columns, std::vector<double>& to) {
-  const double first = t[1] - t[0], second = t[2] - t[1];
-  std::vector<double> slopes[2], halves;
-  for (size_t c = 0; c < columns; ++c) {
-    const double before = (y[columns + c] - y[c]) / first;
-    const double after = (y[2 * columns + c] - y[columns + c]) / second;
-    halves.push_back((after - before) / (first + second));
-    slopes[0].push_back(before - halves[c] * first);
-    slopes[1].push_back(before + halves[c] * first);
-  }
-  for (size_t i = 0; i < 2; ++i) {
-    to.insert(to.end(), columns, 0.0);
-    to.insert(to.end(), halves.begin(), halves.end());
-    to.insert(to.end(), slopes[i].begin(), slopes[i].end());
-    to.insert(to.end(), y + i * columns, y + (i + 1) * columns);
-  }
-}
-
-/// Values over time as piecewise polynomials; cubic ones are SciPy's not-a-knot splines.
-Table make_table(nb::handle times, nb::handle values, const std::string& interpolation,
-                 size_t columns) {
-  const ArrayIn t = as_array(times, "times");
-  const ArrayIn y = as_array(values, "values");
-  check_table(t, y, columns);
-  const size_t n = t.shape(0);
-  Table table;
-  table.breaks.assign(t.data(), t.data() + n);
-  table.columns = static_cast<int>(columns);
-  if (interpolation == "linear") {
-    table.degree = 1;
-    for (size_t i = 0; i + 1 < n; ++i) {
-      for (size_t c = 0; c < columns; ++c)
-        table.coefficients.push_back((y.data()[(i + 1) * columns + c] - y.data()[i * columns + c]) /
-                                     (t.data()[i + 1] - t.data()[i]));
-      for (size_t c = 0; c < columns; ++c) table.coefficients.push_back(y.data()[i * columns + c]);
-    }
-    return table;
-  }
+  check_rows({t.data(), n}, {y.data(), y.size()});
+  if (interpolation == "linear") return linear_table({t.data(), n}, {y.data(), y.size()});
   if (interpolation != "cubic")
     throw InputError("interpolation '" + interpolation + "' is unknown; known: linear, cubic");
-  table.degree = 3;
-  if (n == 3) {
-    add_parabola(t.data(), y.data(), columns, table.coefficients);
-    return table;
-  }
+  if (n == 3) return parabola_table({t.data(), n}, {y.data(), y.size()});
   const nb::object rows = numpy("reshape")(y.object(), nb::make_tuple(n, columns));
   const nb::object spline = python_function("scipy.interpolate", "CubicSpline")(t.object(), rows);
   const ArrayIn c =
       as_array(numpy("transpose")(spline.attr("c"), nb::make_tuple(1, 0, 2)), "coefficients");
-  table.coefficients.assign(c.data(), c.data() + c.size());
-  return table;
+  return {{t.data(), t.data() + n}, 3, static_cast<int>(columns), {c.data(), c.data() + c.size()}};
 }
 
 std::vector<double> constants(nb::handle value, const char* name, size_t n) {
@@ -112,32 +63,12 @@ FunctionCourse course_of(nb::handle breakpoints, nb::handle samples, size_t colu
   if (!breakpoints.is_none()) {
     const ArrayIn times = as_array(breakpoints, "breakpoints");
     course.breakpoints.assign(times.data(), times.data() + times.size());
-    if (!std::is_sorted(course.breakpoints.begin(), course.breakpoints.end()))
-      throw InputError("breakpoints are not increasing; sort them");
   }
   if (!samples.is_none()) course.sampled = make_table(samples[0], samples[1], "linear", columns);
   return course;
 }
 
-/// Without its value yet.
-Wrench wrench_at(const Model& model, const Frame& at, const std::string& frame) {
-  if (frame != "world" && frame != "body")
-    throw InputError("frame '" + frame + "' is unknown; known: world, body");
-  const FramePlacement place = place_frame(model, at);
-  if (place.joint < 0)
-    throw InputError("link '" + at.link + "'" + model.where() +
-                     " is fixed to the ground, where a wrench moves nothing; give a frame on a "
-                     "moving link");
-  Wrench w;
-  w.joint = place.joint;
-  w.world = frame == "world";
-  w.placement = place.placement;
-  return w;
-}
-
-Drive gains(const std::string& name, double kp, double kd) {
-  if (!(kp >= 0) || !(kd >= 0) || !std::isfinite(kp + kd))
-    throw InputError("joint '" + name + "': gains kp and kd must be finite and >= 0");
+Drive pd_drive(double kp, double kd) {
   Drive d;
   d.kind = DriveKind::pd;
   d.kp = kp;
@@ -205,9 +136,6 @@ void PySimulation::torque_callable(const std::string& name, nb::callable fn, nb:
 
 void PySimulation::motion_table(const std::string& name, nb::handle times, nb::handle values,
                                 const std::string& interpolation) {
-  if (interpolation == "linear")
-    throw InputError("joint '" + name +
-                     "': the velocity of a linear table jumps at every row; use cubic");
   Drive d;
   d.kind = DriveKind::motion;
   d.table = make_table(times, values, interpolation, width(name));
@@ -235,14 +163,14 @@ void PySimulation::motion_callable(const std::string& name, nb::callable fn, nb:
 }
 
 void PySimulation::pd(const std::string& name, double kp, double kd, nb::handle target) {
-  Drive d = gains(name, kp, kd);
+  Drive d = pd_drive(kp, kd);
   d.value = constants(target, ("target of joint '" + name + "'").c_str(), width(name));
   set(name, std::move(d));
 }
 
 void PySimulation::pd_table(const std::string& name, double kp, double kd, nb::handle times,
                             nb::handle values, const std::string& interpolation) {
-  Drive d = gains(name, kp, kd);
+  Drive d = pd_drive(kp, kd);
   d.table = make_table(times, values, interpolation, width(name));
   set(name, std::move(d));
 }

@@ -119,6 +119,39 @@ Breakpoints breakpoints(const Wrench& wrench, double tolerance, double largest) 
   return of_function(wrench.course, action, tolerance);
 }
 
+Wrench wrench_at(const Model& model, const Frame& frame, const std::string& axes) {
+  if (axes != "world" && axes != "body")
+    throw InputError("frame '" + axes + "' is unknown; known: world, body");
+  const FramePlacement place = place_frame(model, frame);
+  if (place.joint < 0)
+    throw InputError("link '" + frame.link + "'" + model.where() +
+                     " is fixed to the ground, where a wrench moves nothing; give a frame on a "
+                     "moving link");
+  Wrench wrench;
+  wrench.joint = place.joint;
+  wrench.world = axes == "world";
+  wrench.placement = place.placement;
+  return wrench;
+}
+
+void check_drive(const Model& model, const JointInfo& joint, const Drive& drive) {
+  const bool is_motion = drive.kind == DriveKind::motion, is_pd = drive.kind == DriveKind::pd;
+  const std::string head = "joint '" + joint.name + "'" + model.where() + ": ";
+  if ((is_pd || is_motion) && joint.nq != joint.nv)
+    throw InputError(head + "a " + (is_motion ? "motion" : "pd") +
+                     " drive needs angles or distances, not a quaternion; drive it by torque");
+  if (is_pd && !(drive.kp >= 0 && drive.kd >= 0 && std::isfinite(drive.kp + drive.kd)))
+    throw InputError(head + "gains kp and kd must be finite and >= 0");
+  if (is_motion && drive.table && drive.table->degree < 2)
+    throw InputError(head + "the velocity of a linear table jumps at every row; use cubic");
+  check_course(drive.course);
+}
+
+void check_course(const FunctionCourse& course) {
+  if (!std::is_sorted(course.breakpoints.begin(), course.breakpoints.end()))
+    throw InputError("breakpoints are not increasing; sort them");
+}
+
 void refuse_wrench(const Model& model, int joint) {
   throw InputError("link '" + model.links[model.joints[joint].link].name + "'" + model.where() +
                    " between two joints has no mass, so no wrench can act on it; apply it to the "

@@ -6,6 +6,7 @@
 
 #include "linkwise/forces/breakpoints.hpp"
 #include "linkwise/forces/table.hpp"
+#include "linkwise/model/frame.hpp"
 #include "linkwise/model/model.hpp"
 
 namespace linkwise {
@@ -68,6 +69,15 @@ Breakpoints breakpoints(const Drive& drive, double tolerance, double largest);
 Breakpoints breakpoints(const Wrench& wrench, double tolerance, double largest);
 double largest_action(const Drive& drive);
 double largest_action(const Wrench& wrench);
+
+/// A wrench without its value yet. axes: "world", or "body" for those of the frame where it acts.
+/// InputError where the axes are unknown or the frame is on the ground.
+Wrench wrench_at(const Model& model, const Frame& frame, const std::string& axes);
+
+/// InputError, naming the joint, where a drive is none for it, or makes no sense.
+void check_drive(const Model& model, const JointInfo& joint, const Drive& drive);
+/// InputError where declared breakpoints do not increase.
+void check_course(const FunctionCourse& course);
 
 /// InputError about a wrench on the child link of a joint where that is no body.
 [[noreturn]] void refuse_wrench(const Model& model, int joint);

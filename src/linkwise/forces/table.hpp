@@ -1,13 +1,14 @@
 #pragma once
 // A function of time from a table: piecewise polynomials, several columns at once.
 #include <algorithm>
+#include <span>
 #include <vector>
 
 namespace linkwise {
 
 /// On [breaks[i], breaks[i+1]): sum_k c[i][k] (t - breaks[i])^(degree - k), per column. Beyond the
-/// first and the last break it is constant or, if extended, the polynomials go on. Coefficients are
-/// computed by the caller (a spline library).
+/// first and the last break it is constant or, if extended, the polynomials go on. Coefficients of
+/// splines are computed by the caller (a spline library).
 struct Table {
   std::vector<double> breaks;
   int degree = 1, columns = 1;
@@ -33,5 +34,13 @@ struct Table {
     }
   }
 };
+
+/// InputError, naming the row, unless there are two times at least, they increase, and all values
+/// [times][columns] are finite.
+void check_rows(std::span<const double> times, std::span<const double> values);
+/// Straight lines from row to row.
+Table linear_table(std::span<const double> times, std::span<const double> values);
+/// The parabola through three rows, in two pieces of degree 3: the not-a-knot spline of so few.
+Table parabola_table(std::span<const double> times, std::span<const double> values);
 
 }  // namespace linkwise

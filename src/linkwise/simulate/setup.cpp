@@ -26,18 +26,14 @@ Setup::Setup(std::shared_ptr<const Model> model_, SimulationOptions options_)
 }
 
 void Setup::set_drive(int joint, Drive drive) {
-  const JointInfo& info = model->joints[joint];
-  const bool is_motion = drive.kind == DriveKind::motion;
-  if ((drive.kind == DriveKind::pd || is_motion) && info.nq != info.nv)
-    throw InputError("joint '" + info.name + "'" + model->where() + ": a " +
-                     (is_motion ? "motion" : "pd") +
-                     " drive needs angles or distances, not a quaternion; drive it by torque");
+  check_drive(*model, model->joints[joint], drive);
   drives[joint] = std::move(drive);
   settled_ = false;
 }
 
 void Setup::add_wrench(Wrench wrench) {
   if (!model->joints[wrench.joint].last_of_body) refuse_wrench(*model, wrench.joint);
+  check_course(wrench.course);
   wrenches.push_back(std::move(wrench));
   settled_ = false;
 }

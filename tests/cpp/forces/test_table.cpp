@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "base/draws.hpp"
+#include "base/error_of.hpp"
 #include "linkwise/forces/table.hpp"
 
 namespace linkwise::testing {
@@ -72,6 +73,50 @@ TEST(Table, LinearInterpolationByHand) {
     EXPECT_DOUBLE_EQ(value, values[i]);
     EXPECT_DOUBLE_EQ(rate, times[i] >= 0 && times[i] < 2 ? 2 : 0);
   }
+}
+
+TEST(Table, StraightLinesMeetTheirRows) {
+  const std::vector<double> times{0, 0.5, 2}, rows{1, -1, 3, 4, 0, 5};
+  const Table table = linear_table(times, rows);
+  std::vector<double> out(2);
+  for (size_t i = 0; i < times.size(); ++i) {
+    table.evaluate(times[i], out.data());
+    EXPECT_DOUBLE_EQ(out[0], rows[2 * i]);
+    EXPECT_DOUBLE_EQ(out[1], rows[2 * i + 1]);
+  }
+  table.evaluate(1.25, out.data());
+  EXPECT_DOUBLE_EQ(out[0], 1.5);
+  EXPECT_DOUBLE_EQ(out[1], 4.5);
+}
+
+TEST(Table, ThreeRowsLieOnOneParabola) {
+  // 2 t^2 - 3 t + 1 and -t^2 + 4, at times that are very uneven
+  const auto first = [](double t) { return 2 * t * t - 3 * t + 1; };
+  const auto second = [](double t) { return 4 - t * t; };
+  const std::vector<double> times{-1, -0.999, 2};
+  std::vector<double> rows;
+  for (double t : times) rows.insert(rows.end(), {first(t), second(t)});
+  const Table table = parabola_table(times, rows);
+  std::vector<double> out(2);
+  for (double t = -1; t <= 2; t += 0.125) {
+    table.evaluate(t, out.data());
+    EXPECT_NEAR(out[0], first(t), 1e-11);
+    EXPECT_NEAR(out[1], second(t), 1e-11);
+    table.evaluate(t, out.data(), 1);
+    EXPECT_NEAR(out[0], 4 * t - 3, 1e-11);
+  }
+}
+
+TEST(Table, RowsThatAreNoneAreNamed) {
+  const auto refused = [](std::vector<double> times, std::vector<double> values) {
+    return error_of([&] { check_rows(times, values); });
+  };
+  EXPECT_EQ(refused({0}, {1}), "times has 1 entries; a table needs at least two times");
+  EXPECT_EQ(refused({0, 1}, {1, 2, std::nan(""), 4}), "values is not finite in row 1");
+  EXPECT_EQ(refused({0, 1, 1}, {1, 2, 3}),
+            "times is not increasing at row 2; sort the table by time and remove repeated times");
+  EXPECT_EQ(refused({0, std::nan("")}, {1, 2}),
+            "times is not increasing at row 1; sort the table by time and remove repeated times");
 }
 
 }  // namespace

@@ -151,6 +151,19 @@ TEST(Refused, EachWithOneLine) {
   EXPECT_EQ(error_of([&] { simulation.set_drive(2, pd); }),
             "joint 'joint2' of arm.urdf: a pd drive needs angles or distances, not a quaternion; "
             "drive it by torque");
+  pd.kp = -1;
+  EXPECT_EQ(error_of([&] { simulation.set_drive(0, pd); }),
+            "joint 'joint0' of arm.urdf: gains kp and kd must be finite and >= 0");
+  Drive motion;
+  motion.kind = DriveKind::motion;
+  motion.table = linear_table(std::vector<double>{0, 1}, std::vector<double>{0, 1});
+  EXPECT_EQ(error_of([&] { simulation.set_drive(0, motion); }),
+            "joint 'joint0' of arm.urdf: the velocity of a linear table jumps at every row; use "
+            "cubic");
+  motion.table.reset();
+  motion.course.breakpoints = {2, 1};
+  EXPECT_EQ(error_of([&] { simulation.set_drive(0, motion); }),
+            "breakpoints are not increasing; sort them");
   EXPECT_EQ(error_of([&] { simulation.add_wrench({}); }),
             "link 'link0' of arm.urdf between two joints has no mass, so no wrench can act on it; "
             "apply it to the next body outboard");
