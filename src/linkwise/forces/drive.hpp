@@ -74,7 +74,7 @@ double largest_action(const Wrench& wrench);
 /// InputError where the axes are unknown or the frame is on the ground.
 Wrench wrench_at(const Model& model, const Frame& frame, const std::string& axes);
 
-/// InputError, naming the joint, where a drive is none for it, or makes no sense.
+/// InputError, naming the joint, where it cannot have such a drive, or the drive makes no sense.
 void check_drive(const Model& model, const JointInfo& joint, const Drive& drive);
 /// InputError where declared breakpoints do not increase.
 void check_course(const FunctionCourse& course);
