@@ -364,7 +364,7 @@ Args:
     accept: later guesses may build on this evaluation.
 
 Returns:
-    Accelerations (nv,) [rad/s2, m/s2], joint loads (n_joints, 6) [N, N m] as of joint_loads, and a
+    Accelerations (nv,) [rad/s2, m/s2], joint loads (n_joints + n_loops, 6) [N, N m] as of joint_loads, and a
     Report, which says so where the method failed.
 
 Raises:
