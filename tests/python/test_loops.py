@@ -256,7 +256,6 @@ def test_states_that_leave_a_loop_open_are_refused():
     [
         lambda m: lw.inverse_dynamics(m, np.zeros(3), None, None),
         lambda m: lw.mass_matrix(m, np.zeros(3)),
-        lambda m: lw.DynamicsMethod(m),
         lambda m: lw.joint_loads_by_cause(m, ["gravity"], np.zeros(3), None),
         *(
             lambda m, name=method["name"]: lw.forward_dynamics(m, np.zeros(3), None, method=name)
@@ -268,6 +267,22 @@ def test_states_that_leave_a_loop_open_are_refused():
 def test_what_takes_trees_alone_says_so(ask):
     with pytest.raises(lw.InputError, match=r"closes a loop, and .* takes none"):
         ask(four_bar("c"))
+
+
+def test_a_method_with_memory_takes_loops():
+    machine = lw.scenes.benchmark("stewart")
+    q, v = np.tile(machine.q0, (3, 1)), np.tile(machine.v0, (3, 1))
+    tau = np.random.default_rng(1).normal(size=(3, machine.model.nv))
+    method = lw.DynamicsMethod(machine.model)
+    expected = lw.forward_dynamics(machine.model, q, v, tau)
+    acceleration, loads, _ = method.evaluate(0.0, q[0], v[0], tau[0])
+    np.testing.assert_allclose(acceleration, expected[0], rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(loads, lw.joint_loads(machine.model, q[0], v[0], tau[0]), rtol=1e-10)
+    steps = method.follow(np.arange(3.0), q, v, tau)
+    np.testing.assert_allclose(steps["acceleration"], expected, rtol=1e-10, atol=1e-10)
+    q[1, 0] += 0.1
+    with pytest.raises(lw.InputError, match=r"joint 'head_1' is open"):
+        method.follow(np.arange(3.0), q, v)
 
 
 def test_a_linkage_stretched_straight_is_singular():
