@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "linkwise/integrate/integrator.hpp"
 
 namespace linkwise::test {
@@ -146,6 +148,29 @@ inline double log_slope(const std::vector<double>& x, const std::vector<double>&
   }
   const auto n = static_cast<double>(x.size());
   return (n * sxy - sx * sy) / (n * sxx - sx * sx);
+}
+
+/// The order in which the largest error of a ForcedOscillator falls with the step, at the fraction
+/// s of every step up to t_end. make(system, step) is the integrator.
+template <class Make>
+double convergence_order(const std::vector<double>& steps, double t_end, double s, Make&& make) {
+  std::vector<double> errors;
+  for (const double step : steps) {
+    ForcedOscillator system;
+    const auto integrator = make(system, step);
+    integrator->start(0.0, ForcedOscillator::initial());
+    double error = 0.0;
+    std::vector<double> y(2);
+    while (integrator->time() < t_end - 0.5 * step) {
+      const double before = integrator->time();
+      EXPECT_EQ(integrator->step(t_end), Outcome::converged);
+      const double t = before + s * (integrator->time() - before);
+      integrator->interpolate(t, y);
+      error = std::max(error, ForcedOscillator::error(t, y));
+    }
+    errors.push_back(error);
+  }
+  return log_slope(steps, errors);
 }
 
 }  // namespace linkwise::test

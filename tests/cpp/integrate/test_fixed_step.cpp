@@ -16,26 +16,10 @@ std::unique_ptr<Integrator> make(std::string_view kind, OdeSystem& system, doubl
   return make_integrator(kind, system, options);
 }
 
-/// The largest error at the fraction s of every step up to t = 2, over halved steps.
 double convergence_order(std::string_view kind, double s) {
-  std::vector<double> steps, errors;
-  for (const double step : {0.04, 0.02, 0.01, 0.005}) {
-    ForcedOscillator system;
-    const auto integrator = make(kind, system, step);
-    integrator->start(0.0, ForcedOscillator::initial());
-    double error = 0.0;
-    std::vector<double> y(2);
-    while (integrator->time() < 2.0 - 0.5 * step) {
-      const double before = integrator->time();
-      EXPECT_EQ(integrator->step(2.0), Outcome::converged);
-      const double t = before + s * (integrator->time() - before);
-      integrator->interpolate(t, y);
-      error = std::max(error, ForcedOscillator::error(t, y));
-    }
-    steps.push_back(step);
-    errors.push_back(error);
-  }
-  return log_slope(steps, errors);
+  return convergence_order(
+      {0.04, 0.02, 0.01, 0.005}, 2.0, s,
+      [kind](OdeSystem& system, double step) { return make(kind, system, step); });
 }
 
 TEST(RungeKutta4, HasOrderFourAtAndBetweenSteps) {

@@ -16,26 +16,9 @@ std::unique_ptr<Integrator> make(OdeSystem& system, double tolerance, double max
   return make_integrator("runge_kutta_8", system, options);
 }
 
-/// The largest error at the fraction s of every step up to t = 3, over steps of given length.
 double convergence_order(double s) {
-  std::vector<double> steps, errors;
-  for (const double step : {0.3, 0.2, 0.15, 0.1}) {
-    ForcedOscillator system;
-    const auto integrator = make(system, 1e6, step);
-    integrator->start(0.0, ForcedOscillator::initial());
-    double error = 0.0;
-    std::vector<double> y(2);
-    while (integrator->time() < 3.0) {
-      const double before = integrator->time();
-      EXPECT_EQ(integrator->step(3.0), Outcome::converged);
-      const double t = before + s * (integrator->time() - before);
-      integrator->interpolate(t, y);
-      error = std::max(error, ForcedOscillator::error(t, y));
-    }
-    steps.push_back(step);
-    errors.push_back(error);
-  }
-  return log_slope(steps, errors);
+  return convergence_order({0.3, 0.2, 0.15, 0.1}, 3.0, s,
+                           [](OdeSystem& system, double step) { return make(system, 1e6, step); });
 }
 
 TEST(RungeKutta8, HasOrderEightAtAndSevenBetweenSteps) {

@@ -10,6 +10,7 @@ from lxml import etree
 
 import linkwise as lw
 from helpers.arm_urdf import ARM
+from helpers.load_or_complain import load_or_complain
 from linkwise._core import InputError
 
 REPLACED = [
@@ -425,24 +426,12 @@ def test_any_attribute_may_be_garbage(tmp_path_factory, position, token):
     places = [(element, key) for element in root.iter(etree.Element) for key in element.attrib]
     element, key = places[position % len(places)]
     element.set(key, token)
-    load_or_complain(tmp_path_factory, etree.tostring(root))
+    load_or_complain(tmp_path_factory.getbasetemp(), "fuzz.urdf", etree.tostring(root))
 
 
 @given(st.integers(0, 1400), st.integers(0, 40), st.binary(max_size=4))
 def test_any_bytes_may_be_damaged(tmp_path_factory, start, length, new):
     data = ARM.encode()
-    load_or_complain(tmp_path_factory, data[:start] + new + data[start + length :])
-
-
-def load_or_complain(tmp_path_factory, data):
-    path = tmp_path_factory.getbasetemp() / "fuzz.urdf"
-    path.write_bytes(data)
-    try:
-        lw.load(path)
-    except InputError as error:
-        message = str(error)
-    else:
-        return
-    assert message.isprintable()
-    assert "fuzz.urdf" in message
-    assert "; " in message
+    load_or_complain(
+        tmp_path_factory.getbasetemp(), "fuzz.urdf", data[:start] + new + data[start + length :]
+    )
