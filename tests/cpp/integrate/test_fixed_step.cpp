@@ -16,7 +16,7 @@ std::unique_ptr<Integrator> make(std::string_view kind, OdeSystem& system, doubl
   return make_integrator(kind, system, options);
 }
 
-double convergence_order(std::string_view kind, double s) {
+double order_at(std::string_view kind, double s) {
   return convergence_order(
       {0.04, 0.02, 0.01, 0.005}, 2.0, s,
       [kind](OdeSystem& system, double step) { return make(kind, system, step); });
@@ -24,7 +24,7 @@ double convergence_order(std::string_view kind, double s) {
 
 TEST(RungeKutta4, HasOrderFourAtAndBetweenSteps) {
   for (const double s : {1.0, 0.5, 0.3}) {
-    EXPECT_NEAR(convergence_order("runge_kutta_4", s), 4.0, 0.1) << s;
+    EXPECT_NEAR(order_at("runge_kutta_4", s), 4.0, 0.1) << s;
   }
 }
 
@@ -51,7 +51,7 @@ TEST(RungeKutta4, IsExactForPolynomialsOfDegreeFour) {
 
 TEST(SemiImplicitEuler, HasOrderOneAtAndBetweenSteps) {
   for (const double s : {1.0, 0.5}) {
-    EXPECT_NEAR(convergence_order("semi_implicit_euler", s), 1.0, 0.1) << s;
+    EXPECT_NEAR(order_at("semi_implicit_euler", s), 1.0, 0.1) << s;
   }
 }
 

@@ -16,14 +16,14 @@ std::unique_ptr<Integrator> make(OdeSystem& system, double tolerance, double max
   return make_integrator("runge_kutta_8", system, options);
 }
 
-double convergence_order(double s) {
+double order_at(double s) {
   return convergence_order({0.3, 0.2, 0.15, 0.1}, 3.0, s,
                            [](OdeSystem& system, double step) { return make(system, 1e6, step); });
 }
 
 TEST(RungeKutta8, HasOrderEightAtAndSevenBetweenSteps) {
-  EXPECT_NEAR(convergence_order(1.0), 8.0, 0.4);
-  for (const double s : {0.25, 0.5, 0.8}) EXPECT_GT(convergence_order(s), 7.0) << s;
+  EXPECT_NEAR(order_at(1.0), 8.0, 0.4);
+  for (const double s : {0.25, 0.5, 0.8}) EXPECT_GT(order_at(s), 7.0) << s;
 }
 
 TEST(RungeKutta8, StaysOnConstraintsAndKeepsItsAccuracy) {
