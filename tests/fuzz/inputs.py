@@ -28,7 +28,7 @@ def urdf(rng, folder):
     path = _write(rng, folder / "machine.urdf", data)
     options = {
         "floating_base": rng.random() < 0.3,
-        "mimic": rng.choice(("error", "independent")),
+        "mimic": rng.choice(("error", "independent", "couple")),
         "keep_fixed": rng.random() < 0.3,
         "joint_order": rng.choice(("file", "pinocchio")),
     }
@@ -51,7 +51,7 @@ def sdf(rng, folder):
     data = damage_xml(rng, rng.choice(seeds.SDFS), seeds.SDF_WORDS)
     path = _write(rng, folder / "machine.sdf", data)
     options = {
-        "mimic": rng.choice(("error", "independent")),
+        "mimic": rng.choice(("error", "independent", "couple")),
         "keep_fixed": rng.random() < 0.3,
     }
     return path.name, lambda: _compute(lw.load(path, **options), rng)

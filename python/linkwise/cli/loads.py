@@ -147,7 +147,7 @@ def machine_of(run: Run, file: Path | None) -> Model:
     if own is not None:
         say(f"{file}: is not used, the run holds the model that it was made with")
         return own
-    return model_of(run, load(file, mimic="independent"))
+    return model_of(run, load(file))
 
 
 def rating_tables(run: Run, path: Path | None) -> dict[str, Rating]:

@@ -30,7 +30,7 @@ def load_given(
 
     if path.suffix.lower() != ".toml":
         dirs = package_dirs or []
-        return load(path, floating_base=floating_base, package_dirs=dirs, mimic="independent"), None
+        return load(path, floating_base=floating_base, package_dirs=dirs), None
     if floating_base or package_dirs:
         raise typer.BadParameter("a scenario says itself how its model is loaded; edit it")
     scenario = load_scenario(path)

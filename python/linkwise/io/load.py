@@ -34,8 +34,8 @@ def load(
     package_dirs: Sequence[str | os.PathLike[str]] = (),
     joint_order: JointOrder = "file",
     keep_fixed: bool = False,
-    mimic: Mimic = "error",
-    equality: Equality = "ignore",
+    mimic: Mimic = "couple",
+    equality: Equality = "exact",
 ) -> Model:
     """Read a URDF, MJCF or SDF file into a Model.
 
@@ -52,10 +52,11 @@ def load(
         the joints of one link by name, so that q, v and tau can be handed over as they are.
     keep_fixed: keep fixed joints that carry mass as joints with a load instead of merging
         their links.
-    mimic: mimic joints of URDF and SDF are refused ("error"), tied to the joint that they follow
-        ("couple"), or they move "independent" of each other, with a warning note.
-    equality: an MJCF's connect, weld and joint constraints are left out with a warning ("ignore"),
-        or are spherical and fixed joints that close loops, and couplings ("exact").
+    mimic: mimic joints of URDF and SDF are tied to the joint that they follow ("couple"), move
+        "independent" of it, with a warning note, or are refused ("error").
+    equality: an MJCF's connect, weld and joint constraints are spherical and fixed joints that
+        close loops, and couplings ("exact"), with a warning note because MuJoCo's give way, or
+        are left out with one ("ignore").
 
     Raises InputError, in one line that names file, line, element and remedy, for anything that
     cannot be read without guessing. What was ignored or assumed is in ``model.notes``; each note

@@ -31,7 +31,7 @@ def read_mjcf(
     *,
     gravity: tuple[float, float, float] | None = None,
     keep_fixed: bool = False,
-    equality: Equality = "ignore",
+    equality: Equality = "exact",
     xml: str | None = None,
 ) -> Model:
     """The model that an MJCF file describes.
@@ -61,8 +61,8 @@ def read_mjcf(
                 notes += closing.notes()
             elif mj_model.neq:
                 count = mj_model.neq
-                text = f'{count} equality constraints ignored: loops stay open; equality="exact" '
-                text += "takes those of connect, weld and joint"
+                text = f'{count} equality constraints ignored, as equality="ignore" asks: loops '
+                text += "stay open"
                 notes.append(("warning", "equality", text))
         for level, element, text in notes:
             builder.add_note(level, element, text)

@@ -18,7 +18,7 @@ import numpy as np
 from linkwise.base import Array
 from linkwise.io.complaint import shorten
 
-Equality = Literal["ignore", "exact"]
+Equality = Literal["exact", "ignore"]
 
 
 @dataclass
@@ -64,9 +64,9 @@ class Equalities:
         for closure in self.closures:
             kind = "connect" if closure.type == "spherical" else "weld"
             text = f"<{kind}> is made exact: a {closure.type} joint without give"
-            yield "info", shorten(closure.name), text
+            yield "warning", shorten(closure.name), text
         for name, *_ in self.couplings:
-            yield "info", shorten(name), "<joint> is made exact: a coupling without give"
+            yield "warning", shorten(name), "<joint> is made exact: a coupling without give"
 
     def _is(self, index: int, kind: str) -> bool:
         import mujoco

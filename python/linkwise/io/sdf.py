@@ -23,7 +23,7 @@ from linkwise._core import InputError, Model, ModelBuilder
 from linkwise.base import Array
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.sdf_frames import MODEL, WORLD, Frames, SdfElement, pose_of, quaternion_of
-from linkwise.io.urdf import MIMIC_REMEDY, Mimic
+from linkwise.io.urdf import MIMIC_REMEDY, MISSING_LEADER, Mimic
 from linkwise.io.xml import is_foreign, local_name
 
 #: Joint types of the format, with their names here and how many axes they have.
@@ -69,7 +69,7 @@ def read_sdf(
     *,
     gravity: tuple[float, float, float] | None = None,
     keep_fixed: bool = False,
-    mimic: Mimic = "error",
+    mimic: Mimic = "couple",
 ) -> Model:
     """The model that the parsed SDF ``root`` describes; ``path`` is for messages.
 
@@ -258,7 +258,7 @@ class _Reader:
         if leader == name:
             axis.fail("mimics itself", "name another joint")
         if f"joint '{leader}'" not in self._found:
-            axis.fail(f"mimics joint '{shorten(leader)}', which does not exist", "name a joint")
+            axis.fail(f"mimics joint '{shorten(leader)}', which does not exist", MISSING_LEADER)
         multiplier, offset, reference = (
             default if mimic.get(key) is None else mimic.number(key, f"mimic {key}")
             for key, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))

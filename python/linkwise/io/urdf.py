@@ -23,14 +23,15 @@ from linkwise.io.urdf_transmissions import Transmissions
 from linkwise.io.urdf_vocabulary import ATTRIBUTES, Vocabulary
 from linkwise.io.xml import is_foreign, local_name
 
-Mimic = Literal["independent", "error", "couple"]
+Mimic = Literal["couple", "independent", "error"]
 JointOrder = Literal["file", "pinocchio"]
 
-#: What to do about a mimic joint where couplings are no option that was chosen.
+#: What to do about a mimic joint where they are refused, and about one whose leader is not there.
 MIMIC_REMEDY = (
     'couple them with mimic="couple", let it move on its own with mimic="independent", or remove '
     "<mimic>"
 )
+MISSING_LEADER = 'name a joint, or let it move on its own with mimic="independent"'
 JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 _LIMITED = ("revolute", "prismatic")
 _LIMITS = ("lower", "upper", "effort", "velocity")
@@ -59,7 +60,7 @@ def read_urdf(
     floating_base: bool = False,
     joint_order: JointOrder = "file",
     keep_fixed: bool = False,
-    mimic: Mimic = "error",
+    mimic: Mimic = "couple",
 ) -> Model:
     """The model that the parsed URDF ``root`` describes; ``path`` is for messages.
 
@@ -279,7 +280,7 @@ class _Reader:
         if self._mimic == "couple" and target == name:
             element.fail("mimics itself", "name another joint")
         if self._mimic == "couple" and f"joint '{target}'" not in self._found:
-            element.fail(f"mimics joint '{shorten(target)}', which does not exist", "name a joint")
+            element.fail(f"mimics joint '{shorten(target)}', which does not exist", MISSING_LEADER)
         self._mimics[name] = (target, multiplier, offset)
 
     def add_couplings(self, builder: ModelBuilder) -> None:

@@ -412,8 +412,8 @@ class ScenarioFile(Section):
     floating_base: bool = False
     joint_order: Literal["file", "pinocchio"] = "file"
     keep_fixed: bool = False
-    mimic: Literal["error", "independent", "couple"] = "error"
-    equality: Literal["ignore", "exact"] = "ignore"
+    mimic: Literal["couple", "independent", "error"] = "couple"
+    equality: Literal["exact", "ignore"] = "exact"
     package_dirs: list[str] = []
     initial: InitialSection = InitialSection()
     drive: dict[str, DriveSection] = {}

@@ -193,7 +193,6 @@ def _load_model(path: Path, options: Options) -> tuple[Model, Path | None, Seque
             path,
             floating_base=options.floating_base,
             package_dirs=options.package_dirs,
-            mimic="independent",
         )
         return model, path, options.package_dirs
     scenario = load_scenario(path)

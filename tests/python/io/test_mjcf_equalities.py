@@ -51,7 +51,7 @@ def random_pose(mj_model, seed):
 def both(equality, seed=0):
     text = MACHINE % equality
     mj_model = mujoco.MjModel.from_xml_string(text)
-    model = lw.load(text, equality="exact")
+    model = lw.load(text)
     qpos, residual = random_pose(mj_model, seed)
     frames = closing_frames(model, position_from_mujoco(model, mj_model, qpos))
     return model, frames[0], residual
@@ -85,7 +85,7 @@ def test_a_joint_constraint_is_a_coupling(inside):
     """Its sum is off by what MuJoCo's residual says, whose hinges count from their ref."""
     text = (MACHINE % f'<joint name="e" {inside}/>').replace('name="b1"', 'name="b1" ref="20"')
     mj_model = mujoco.MjModel.from_xml_string(text)
-    model = lw.load(text, equality="exact")
+    model = lw.load(text)
     assert model.coupling_names == ["e"]
     found = Equalities(mj_model, rotation, Names(mj_model).joint)
     ((name, factors, offset),) = found.couplings
@@ -103,13 +103,10 @@ def notes_of(text, **options):
     return model, [note.text for note in model.notes if note.element == "equality"]
 
 
-def test_left_out_unless_asked_for():
-    model, notes = notes_of(MACHINE % CONNECTS["bodies"])
+def test_left_out_where_asked_for():
+    model, notes = notes_of(MACHINE % CONNECTS["bodies"], equality="ignore")
     assert model.n_loops == 0
-    assert notes == [
-        '1 equality constraints ignored: loops stay open; equality="exact" takes those of connect, '
-        "weld and joint"
-    ]
+    assert notes == ['1 equality constraints ignored, as equality="ignore" asks: loops stay open']
 
 
 @pytest.mark.parametrize(
@@ -120,7 +117,7 @@ def test_left_out_unless_asked_for():
     ],
 )
 def test_others_are_named(equality, reason):
-    model, notes = notes_of(MACHINE % equality, equality="exact")
+    model, notes = notes_of(MACHINE % equality)
     assert model.n_loops == 0
     assert notes == [f"1 equality constraints ignored: {reason}"]
 
@@ -129,16 +126,14 @@ def test_switched_off_by_the_file():
     text = (MACHINE % CONNECTS["bodies"]).replace(
         "<worldbody>", '<option><flag equality="disable"/></option><worldbody>'
     )
-    assert notes_of(text, equality="exact")[1] == [
-        "1 equality constraints ignored: the file switches them off"
-    ]
+    assert notes_of(text)[1] == ["1 equality constraints ignored: the file switches them off"]
 
 
 def test_mocap_bodies_hold_nothing():
     text = (MACHINE % '<weld body1="m" body2="c"/>').replace(
         "<worldbody>", '<worldbody><body name="m" mocap="true"/>'
     )
-    model, notes = notes_of(text, equality="exact")
+    model, notes = notes_of(text)
     assert model.n_loops == 0
     assert "they hold a mocap body, which a program moves" in notes[0]
 
@@ -147,22 +142,33 @@ def test_bodies_that_are_one_are_left_out():
     text = (MACHINE % '<weld body1="a" body2="d"/>').replace(
         "</body>\n  <body name=\"c\"", '<body name="d" pos="0 0 1"/></body>\n  <body name="c"'
     )  # fmt: skip
-    assert "both of their bodies are one" in notes_of(text, equality="exact")[1][0]
+    assert "both of their bodies are one" in notes_of(text)[1][0]
 
 
-def test_says_that_it_is_exact():
-    model = lw.load(MACHINE % CONNECTS["bodies"], equality="exact")
-    texts = [note.text for note in model.notes if note.element == "e"]
-    assert "<connect> is made exact: a spherical joint without give" in texts
+@pytest.mark.parametrize(
+    ("equality", "text"),
+    [
+        (CONNECTS["bodies"], "<connect> is made exact: a spherical joint without give"),
+        (WELDS["sites"], "<weld> is made exact: a fixed joint without give"),
+        ('<joint name="e" joint1="b1"/>', "<joint> is made exact: a coupling without give"),
+    ],
+)
+def test_runs_say_that_it_is_exact(equality, text):
+    with pytest.warns(lw.ModelWarning, match="made exact"):
+        model = lw.load(MACHINE % equality)
+    q0 = lw.assemble(model, model.initial_configuration()).q if model.n_loops else None
+    run = lw.simulate(model, duration=0.01, q0=q0)
+    assert {"element": "e", "text": text} in run.warnings
 
 
 def test_names_are_unique():
-    model = lw.load(MACHINE % CONNECTS["bodies"].replace('"e"', '"b1"'), equality="exact")
+    model = lw.load(MACHINE % CONNECTS["bodies"].replace('"e"', '"b1"'))
     assert model.loop_names == ["b1_"]
 
 
 def test_in_a_scenario(tmp_path):
     (tmp_path / "m.xml").write_text(MACHINE % CONNECTS["bodies"])
     path = tmp_path / "s.toml"
-    path.write_text('model = "m.xml"\nequality = "exact"\n[simulate]\nduration = 1\n')
-    assert lw.load_scenario(path).load_model().n_loops == 1
+    for line, count in (("", 1), ('equality = "ignore"\n', 0)):
+        path.write_text(f'model = "m.xml"\n{line}[simulate]\nduration = 1\n')
+        assert lw.load_scenario(path).load_model().n_loops == count

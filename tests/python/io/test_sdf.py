@@ -196,6 +196,8 @@ def test_joints_between_frames():
 def test_mimic():
     inside = '<axis><xyz>0 0 1</xyz><mimic joint="x"><multiplier>2</multiplier></mimic></axis>'
     with pytest.raises(lw.InputError, match="mimics joint 'x'"):
+        lw.load(one_joint("revolute", inside), mimic="error")
+    with pytest.raises(lw.InputError, match="mimics joint 'x', which does not exist"):
         lw.load(one_joint("revolute", inside))
     with pytest.warns(lw.ModelWarning, match="mimics joint 'x'"):
         lw.load(one_joint("revolute", inside), mimic="independent")
@@ -208,7 +210,7 @@ def test_mimic_as_a_coupling():
         "<reference>0.1</reference></mimic>"
     )
     twin = lw.load(PRESS).with_coupling("drive_mimic", {"drive": 1, "knee": -2}, offset=0.3)
-    model = lw.load(PRESS.replace("<dynamics>", f"{mimic}<dynamics>"), mimic="couple")
+    model = lw.load(PRESS.replace("<dynamics>", f"{mimic}<dynamics>"))
     assert model.hash == twin.hash
 
 

@@ -154,14 +154,14 @@ def test_default_namespace_and_undeclared_prefixes_are_read(arm):
     assert lw.load(arm).joint_names == ["shoulder", "slide"]
 
 
-def test_mimic_is_an_error_or_independent_with_a_warning(arm, complaint):
+def test_mimic_is_independent_with_a_warning_or_an_error_where_asked_for(arm, complaint):
     mimic = '<mimic joint="shoulder" multiplier="2" offset="0.1"/>'
     arm.write_text(arm.read_text().replace('<axis xyz="1 0 0"/>', f'<axis xyz="1 0 0"/>{mimic}'))
     model = lw.load(arm, mimic="independent")
     assert model.nv == 2
     text = "mimics joint 'shoulder': the coupling is ignored, it moves independently"
     assert ("warning", "slide", text) in notes(model)
-    message = complaint(lw.load, arm)
+    message = complaint(lw.load, arm, mimic="error")
     assert message == (
         ":26: joint 'slide': mimics joint 'shoulder'; couple them with mimic=\"couple\", "
         'let it move on its own with mimic="independent", or remove <mimic>'
@@ -173,7 +173,7 @@ def test_mimic_as_a_coupling(arm, complaint):
     twin = lw.load(arm).with_coupling("slide_mimic", {"slide": 1, "shoulder": -2}, offset=0.1)
     mimic = '<mimic joint="shoulder" multiplier="2" offset="0.1"/>'
     arm.write_text(text.replace(axis, f"{axis}{mimic}"))
-    model = lw.load(arm, mimic="couple")
+    model = lw.load(arm)
     assert model.coupling_names == ["slide_mimic"]
     assert model.hash == twin.hash
     for wrong, said in {
@@ -182,7 +182,7 @@ def test_mimic_as_a_coupling(arm, complaint):
         mimic.replace('"2"', '"0"'): "coupling 'slide_mimic': the factor of joint 'shoulder'",
     }.items():
         arm.write_text(text.replace(axis, f"{axis}{wrong}"))
-        message = complaint(lw.load, arm, mimic="couple")
+        message = complaint(lw.load, arm)
         assert message.startswith(":26: "), message
         assert said in message, message
 
