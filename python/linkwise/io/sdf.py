@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from linkwise._core import InputError, Model, ModelBuilder
+from linkwise._core import Model, ModelBuilder
 from linkwise.base import Array
+from linkwise.io.building import build
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.sdf_frames import MODEL, WORLD, Frames, SdfElement, pose_of, quaternion_of
 from linkwise.io.urdf import MIMIC_REMEDY, MISSING_LEADER, Mimic
@@ -34,6 +35,7 @@ JOINT_TYPES = {
     "prismatic": ("prismatic", 1),
     "screw": ("helical", 1),
     "universal": ("universal", 2),
+    "revolute2": ("universal", 2),
     "ball": ("spherical", 0),
 }
 _UNLIMITED = 1e16
@@ -80,12 +82,7 @@ def read_sdf(
     chosen = gravity or reader.gravity or (0.0, 0.0, -9.81)
     builder = ModelBuilder(reader.name, gravity=chosen, source=file_name(path))
     reader.fill(builder)
-    for note in reader.notes():
-        builder.add_note(*note)
-    try:
-        return builder.build(keep_fixed=keep_fixed)
-    except InputError as error:
-        raise reader.with_line(error) from None
+    return build(builder, path, reader.notes(), reader.found, {}, keep_fixed=keep_fixed)
 
 
 @dataclass
@@ -103,7 +100,7 @@ class SdfJoint:
 class _Reader:
     def __init__(self, path: str | os.PathLike[str], root: etree._Element, mimic: Mimic) -> None:
         self._path, self._mimic = path, mimic
-        self._found: dict[str, SdfElement] = {}
+        self.found: dict[str, SdfElement] = {}
         self._notes: list[tuple[str, str, str]] = []
         self._harmless: Counter[str] = Counter()
         self.gravity: tuple[float, float, float] | None = None
@@ -185,7 +182,7 @@ class _Reader:
             found.fail("has a name that the format reserves", "rename it")
         if self._frames.taken(name):
             found.fail("the name is used twice", "rename one of them")
-        self._found[f"{tag} '{name}'"] = found
+        self.found[f"{tag} '{name}'"] = found
         if tag == "link":
             self._frames.links[name] = found
             self._frames.add(name, found, MODEL, name)
@@ -213,7 +210,9 @@ class _Reader:
 
     def fill(self, builder: ModelBuilder) -> None:
         """Links and joints; each link hangs on the first joint that reaches it from the root."""
-        joints = [self._joint(element) for element in self._joints]
+        gearboxes = [e for e in self._joints if e.get("type") == "gearbox"]
+        joints = [self._joint(e) for e in self._joints if e.get("type") != "gearbox"]
+        self._couplings += [self._gearbox(element, joints) for element in gearboxes]
         hangs_on, roots = self._tree(joints)
         frames = {WORLD: np.eye(4)}
         for name, link in self._frames.links.items():
@@ -257,7 +256,7 @@ class _Reader:
         leader = mimic.get("joint") or ""
         if leader == name:
             axis.fail("mimics itself", "name another joint")
-        if f"joint '{leader}'" not in self._found:
+        if f"joint '{leader}'" not in self.found:
             axis.fail(f"mimics joint '{shorten(leader)}', which does not exist", MISSING_LEADER)
         multiplier, offset, reference = (
             default if mimic.get(key) is None else mimic.number(key, f"mimic {key}")
@@ -265,6 +264,33 @@ class _Reader:
         )
         factors = {name: 1.0, leader: -multiplier}
         self._couplings.append((f"{name}_mimic", factors, offset - multiplier * reference))
+
+    def _gearbox(
+        self, element: SdfElement, joints: list[SdfJoint]
+    ) -> tuple[str, dict[str, float], float]:
+        """theta_2 = -ratio theta_1, the angles of child and parent against the reference body."""
+        name = str(element.get("name"))
+        if element.get("gearbox_reference_body") is None:
+            remedy = "name the link in which both of its shafts turn"
+            element.fail("has no <gearbox_reference_body>", remedy)
+        ratio = element.number("gearbox_ratio", "gearbox_ratio")
+        housing = self._frames.link_of(
+            str(element.get("gearbox_reference_body")).strip(), element, "gearbox_reference_body"
+        )
+        pose = self._frames.pose(name, element)
+        factors: dict[str, float] = {}
+        for role, tag, factor in (("parent", "axis", ratio), ("child", "axis2", 1.0)):
+            shaft = self._frames.link_of(self._end(element, role), element, role)
+            direction = pose[:3, :3] @ self._axis(element, element.child(tag), pose)
+            found, sign = _turning(joints, housing, shaft, direction)
+            if found is None:
+                element.fail(
+                    f"no revolute joint about its {tag} joins '{shorten(housing)}' and "
+                    f"'{shorten(shaft)}'",
+                    f"add the joint in which its {role} turns, or correct the axis",
+                )
+            factors[found.name] = factors.get(found.name, 0.0) + sign * factor
+        return name, factors, 0.0
 
     def _tree(self, joints: list[SdfJoint]) -> tuple[dict[str, SdfJoint], list[str]]:
         """By link the joint that it hangs on, breadth first, and the links that hang on none."""
@@ -323,7 +349,7 @@ class _Reader:
         name, kind = str(element.get("name")), element.get("type")
         if kind not in JOINT_TYPES:
             problem = "has no type" if kind is None else f"type '{shorten(kind)}' is not read"
-            element.fail(problem, f"use one of {', '.join(JOINT_TYPES)}")
+            element.fail(problem, f"use one of {', '.join(JOINT_TYPES)}, gearbox")
         here, n_axes = JOINT_TYPES[kind]
         ends = [
             self._frames.link_of(self._end(element, role), element, role)
@@ -427,12 +453,19 @@ class _Reader:
         ]
         return [*self._notes, *counted]
 
-    def with_line(self, error: InputError) -> InputError:
-        """The core's complaint, ELEMENT of FILE: PROBLEM; REMEDY, as FILE:LINE: ELEMENT: ..."""
-        element, _, rest = str(error).partition(f" of {file_name(self._path)}")
-        found = self._found.get(element)
-        if element.startswith("coupling '"):
-            found = self._found.get(f"joint '{element[10:-1].removesuffix('_mimic')}'")
-        line = f":{found.line}" if found is not None and found.line else ""
-        text = shorten(f"{element}{rest}", 2000)
-        return InputError(f"{shorten(os.fspath(self._path), 400)}{line}: {text}")
+
+def _turning(
+    joints: list[SdfJoint], housing: str, shaft: str, direction: Array
+) -> tuple[SdfJoint | None, float]:
+    """The hinge between two links about a direction of the world, and the sign of its angle when
+    the shaft turns about that direction."""
+    for joint in joints:
+        ends = (joint.parent, joint.child)
+        if joint.type in ("revolute", "continuous") and ends in (
+            (housing, shaft),
+            (shaft, housing),
+        ):
+            along = float(joint.pose[:3, :3] @ joint.properties["axis"] @ direction)
+            if abs(along) > 1 - 1e-6:
+                return joint, math.copysign(1.0, along) * (1.0 if joint.child == shaft else -1.0)
+    return None, 0.0

@@ -15,8 +15,9 @@ from typing import Any, Literal
 import numpy as np
 from lxml import etree
 
-from linkwise._core import InputError, Model, ModelBuilder
+from linkwise._core import Model, ModelBuilder
 from linkwise.base import Array
+from linkwise.io.building import build
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.urdf_elements import UrdfElement
 from linkwise.io.urdf_transmissions import Transmissions
@@ -39,17 +40,6 @@ _LIMITS = ("lower", "upper", "effort", "velocity")
 _FAR = 5.0
 _WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
 _INERTIA = ATTRIBUTES["inertia"]
-#: The part that a complaint of the core is about, by its first word.
-_PARTS = {
-    "mass": "mass",
-    "inertia": "inertia",
-    "axis": "axis",
-    "lower": "limit",
-    "effort": "limit",
-    "velocity": "limit",
-    "damping": "dynamics",
-    "friction": "dynamics",
-}
 
 
 def read_urdf(
@@ -84,12 +74,7 @@ def read_urdf(
     if floating_base:
         builder.set_floating_base()
     reader.note_what_is_left_out()
-    for note in reader.notes:
-        builder.add_note(*note)
-    try:
-        return builder.build(keep_fixed=keep_fixed)
-    except InputError as error:
-        raise reader.with_line(error) from None
+    return build(builder, path, reader.notes, reader.found, reader.first, keep_fixed=keep_fixed)
 
 
 @dataclass
@@ -137,8 +122,8 @@ class _Reader:
         self._mimic = mimic
         self._mimics: dict[str, tuple[str, float, float]] = {}  # of whom, multiplier, offset
         self._inertials: dict[str, tuple[float, Array, Array]] = {}
-        self._found: dict[str, UrdfElement] = {}
-        self._first: dict[str, UrdfElement] = {}  # of those whose name is used again
+        self.found: dict[str, UrdfElement] = {}
+        self.first: dict[str, UrdfElement] = {}  # of those whose name is used again
         self._vocabulary = Vocabulary(path, root)
         for element in root.iterchildren(tag=etree.Element):
             tag = local_name(element)
@@ -155,9 +140,9 @@ class _Reader:
         if not name:
             found.fail("has no name", 'add name="..."')
         key = f"{kind} '{name}'"
-        if key in self._found:
-            self._first.setdefault(key, self._found[key])
-        self._found[key] = found
+        if key in self.found:
+            self.first.setdefault(key, self.found[key])
+        self.found[key] = found
         return found
 
     def add_link(self, builder: ModelBuilder, link: UrdfElement) -> None:
@@ -279,7 +264,7 @@ class _Reader:
             element.fail(f"mimics joint '{shorten(target)}'", MIMIC_REMEDY)
         if self._mimic == "couple" and target == name:
             element.fail("mimics itself", "name another joint")
-        if self._mimic == "couple" and f"joint '{target}'" not in self._found:
+        if self._mimic == "couple" and f"joint '{target}'" not in self.found:
             element.fail(f"mimics joint '{shorten(target)}', which does not exist", MISSING_LEADER)
         self._mimics[name] = (target, multiplier, offset)
 
@@ -324,7 +309,7 @@ class _Reader:
     def note_what_is_left_out(self) -> None:
         # A target that does not exist is no error: the coupling is not used either way.
         for joint, (target, *_) in self._mimics.items() if self._mimic == "independent" else ():
-            missing = "" if f"joint '{target}'" in self._found else ", which does not exist"
+            missing = "" if f"joint '{target}'" in self.found else ", which does not exist"
             self._note(
                 joint,
                 f"mimics joint '{shorten(target)}'{missing}: "
@@ -334,22 +319,3 @@ class _Reader:
 
     def _note(self, element: str, text: str) -> None:
         self.notes.append(("warning", element, text))
-
-    def with_line(self, error: InputError) -> InputError:
-        """The core's complaint, ELEMENT of FILE: PROBLEM; REMEDY, as FILE:LINE: ELEMENT: ..."""
-        element, _, rest = str(error).partition(f" of {file_name(self.path)}")
-        found = self._found.get(element)
-        if element.startswith("coupling '"):
-            found = self._found.get(f"joint '{element[10:-1].removesuffix('_mimic')}'")
-        words = rest.removeprefix(": ").split()
-        if found is None:  # links 'a' and 'b'
-            found = self._found.get("link " + element.rpartition(" and ")[2])
-        elif words and (part := _PARTS.get(words[0])):
-            for inner in ("inertial", part):
-                found = found.child(inner) or found
-        if first := self._first.get(element):
-            twice = "the name is used twice"
-            rest = rest.replace(twice, f"{twice} (first on line {first.line})", 1)
-        line = f":{found.line}" if found is not None and found.line else ""
-        text = shorten(f"{element}{rest}", 2000)
-        return InputError(f"{shorten(os.fspath(self.path), 400)}{line}: {text}")

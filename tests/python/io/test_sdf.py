@@ -1,5 +1,7 @@
 """SDF: what its elements become, against the same machine built by hand or read from a URDF."""
 
+from importlib import metadata
+
 import numpy as np
 import pytest
 
@@ -250,3 +252,92 @@ def test_a_row_of_five_thousand_links_is_read():
         for i in range(5000)
     )
     assert lw.load(sdf(links + joints)).n_joints == 5000
+
+
+def shafts(ratio, first="housing shaft 0 0 1", second="housing wheel 0 0 1", axes="0 0 1 0 0 1"):
+    """A housing, two shafts in it, and a gearbox from the first to the second."""
+    axis, axis2 = axes[: len(axes) // 2], axes[len(axes) // 2 :]
+    links = "".join(
+        f'<link name="{name}"><pose>{x} 0 0 0 0 0</pose>{LINK}</link>'
+        for x, name in enumerate(("housing", "shaft", "wheel"))
+    )
+    joints = "".join(
+        f'<joint name="turn_{name}" type="revolute"><parent>{parent}</parent><child>{child}</child>'
+        f"<axis><xyz>{xyz}</xyz></axis></joint>"
+        for name, (parent, child, xyz) in zip(
+            ("shaft", "wheel"), (line.split(maxsplit=2) for line in (first, second)), strict=True
+        )
+    )
+    return sdf(
+        f'{links}<joint name="w" type="fixed"><parent>world</parent><child>housing</child></joint>'
+        f'{joints}<joint name="gears" type="gearbox"><parent>shaft</parent><child>wheel</child>'
+        "<gearbox_reference_body>housing</gearbox_reference_body>"
+        f"<gearbox_ratio>{ratio}</gearbox_ratio>"
+        f"<axis><xyz>{axis}</xyz></axis><axis2><xyz>{axis2}</xyz></axis2></joint>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("changed", "sign"),
+    [({}, -1), ({"second": "housing wheel 0 0 -1"}, 1), ({"axes": "0 0 1 0 0 -1"}, 1)],
+)
+def test_a_gearbox_turns_its_child_by_minus_its_ratio(changed, sign):
+    """theta_2 = -ratio theta_1; under a torque T on the first shaft I a = T / (1 + ratio^2)."""
+    model = lw.load(shafts(0.25, **changed), gravity=(0, 0, 0))
+    assert (model.coupling_names, model.n_loops, model.nv) == (["gears"], 0, 2)
+    found = lw.forward_dynamics(model, [0, 0], [0, 0], [3, 0])
+    expected = 3 / (0.01 * (1 + 0.25**2))
+    np.testing.assert_allclose(found, [expected, sign * 0.25 * expected], rtol=1e-12)
+
+
+def test_a_gearbox_without_a_joint_for_its_shaft_is_refused():
+    with pytest.raises(
+        lw.InputError, match="no revolute joint about its axis2 joins 'housing' and"
+    ):
+        lw.load(shafts(2, axes="0 0 1 0 1 0"))
+    with pytest.raises(lw.InputError, match="has no <gearbox_reference_body>; name the link"):
+        lw.load(shafts(2).replace("gearbox_reference_body", "gearbox_body"))
+
+
+def test_revolute2_is_two_hinges_in_series():
+    """The first turns what the second turns in, as two joints in a row would."""
+    inside = "<axis><xyz>0 0 1</xyz></axis><axis2><xyz>0.6 0.8 0</xyz></axis2>"
+    model = lw.load(one_joint("revolute2", inside))
+    half = f'<link name="h"><pose>0 0 1 0 0 0</pose><inertial>{MASS}</inertial></link>'
+    row = one_joint("revolute", "<axis><xyz>0.6 0.8 0</xyz></axis>").replace(
+        "<parent>a</parent>", "<parent>h</parent>"
+    )
+    row = row.replace(
+        '<joint name="j"',
+        f'{half}<joint name="i" type="revolute"><parent>a</parent><child>h</child>'
+        '<axis><xyz>0 0 1</xyz></axis></joint><joint name="j"',
+    )
+    for q in np.random.default_rng(3).normal(size=(3, 2)):
+        expected = pose_of(lw.load(row), "b", q)
+        np.testing.assert_allclose(pose_of(model, "b", q), expected, atol=1e-14)
+
+
+CASSIE = sorted(
+    str(file.locate())
+    for file in metadata.files("example-robot-data") or []
+    if file.suffix == ".sdf" and "cassie" in file.name
+)
+
+
+@pytest.mark.filterwarnings("ignore::linkwise.ModelWarning")
+@pytest.mark.parametrize("path", CASSIE)
+def test_cassie_stands_on_closed_loops(path):
+    """Its loops are closed as drawn, and gearboxes tie ten motors to their joints."""
+    model = lw.load(path)
+    loops, gears = (6, 10) if path.endswith("cassie.sdf") else (4, 0)
+    assert (model.n_loops, len(model.coupling_names)) == (loops, gears)
+    gaps = lw.loop_gaps(model, model.initial_configuration())
+    np.testing.assert_allclose(gaps, 0, atol=1e-14)
+    q, v = model.initial_configuration(), np.zeros(model.nv)
+    fall = lw.forward_dynamics(model, q, v)
+    # In free fall nothing inside accelerates, except what springs and gravity's frame ask for.
+    np.testing.assert_allclose(np.linalg.norm(fall), 9.81, rtol=1e-9)
+
+
+def test_there_are_files_of_cassie():
+    assert len(CASSIE) >= 3
