@@ -42,16 +42,18 @@ nb::tuple simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, n
   const Executor executor = executor_for(whole_number(threads, "threads"));
   Interrupt interrupt;
   std::vector<Ending> endings;
+  ForcesOfMembers doubt;
   {
     const GilReleased released;
     endings = simulate_batch(
         all, start, {times.data, n}, columns.sample, executor,
-        [&interrupt] { return !interrupt(); }, keep ? extremes.data : nullptr);
+        [&interrupt] { return !interrupt(); }, keep ? extremes.data : nullptr, &doubt);
   }
   const bool interrupted = interrupt.was_keyboard();
   nb::list ends;
   for (Ending& ending : endings) ends.append(nb::cast(std::move(ending)));
-  return nb::make_tuple(columns.to_python(members), extremes.array, ends, interrupted);
+  return nb::make_tuple(columns.to_python(members), extremes.array, ends, interrupted,
+                        nb::make_tuple(doubt.members, doubt.worst, doubt.text));
 }
 
 }  // namespace
@@ -62,7 +64,9 @@ void bind_batch_simulation(nb::module_& m) {
         "The loop behind linkwise.simulate_batch: rows (member, ...), members of one simulation "
         "next to each other.\n"
         "(arrays by name, extremes (member, ...) where the simulations keep them, endings, "
-        "interrupted by Ctrl-C).");
+        "interrupted by Ctrl-C,\n"
+        "(members whose forces of large gain are not known well, the worst one, what is said of "
+        "it)).");
 }
 
 }  // namespace linkwise::bindings

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Every URDF and MJCF of installed packages or of given folders, ours beside Pinocchio and MuJoCo.
+"""Every URDF, SDF and MJCF of installed packages or given folders, beside Pinocchio and MuJoCo.
 
     python tools/corpus.py [FOLDER ...] [--json FILE]
 
 At a random state of each machine that loads, our mass matrix is compared with Pinocchio's (URDF,
 mimic joints independent, machines without a moving joint on a floating base) or MuJoCo's (MJCF).
-Prints how many load and agree, and each refusal with its reason. It belongs to no
-test: what is installed differs.
+The only witness of an SDF is a URDF of its name. Prints how many load and agree, and each refusal
+with its reason. It belongs to no test: what is installed differs.
 """
 
 from __future__ import annotations
@@ -29,17 +29,21 @@ from linkwise.io import mjcf_state
 
 AGREE = 1e-9
 MOST_FREEDOMS = 1500
+KINDS = ("URDF", "SDF", "MJCF")
 
 
-def found_in(folders: list[Path]) -> tuple[list[Path], list[Path]]:
-    """URDF files, and XML files whose root is <mujoco>."""
-    urdf = sorted({p for folder in folders for p in folder.rglob("*.urdf")})
+def found_in(folders: list[Path]) -> tuple[list[Path], list[Path], list[Path]]:
+    """URDF and SDF files, and XML files whose root is <mujoco>."""
+    urdf, sdf = (
+        sorted({p for folder in folders for p in folder.rglob(f"*.{end}")})
+        for end in ("urdf", "sdf")
+    )
     mjcf = []
     for path in sorted({p for folder in folders for p in folder.rglob("*.xml")}):
         head = path.read_bytes()[:4096]
         if re.search(rb"<mujoco\b(?!include)", head):
             mjcf.append(path)
-    return urdf, mjcf
+    return urdf, sdf, mjcf
 
 
 def difference(ours: Any, theirs: Any) -> float:
@@ -82,6 +86,28 @@ def of_urdf(path: Path, rng: np.random.Generator) -> tuple[str, float | None, st
     crba = pin.crba(theirs, theirs.createData(), qp)
     symmetric = np.triu(crba) + np.triu(crba, 1).T
     apart = difference(lw.mass_matrix(model, q), symmetric)
+    return ("agrees" if apart < AGREE else "differs"), apart, ""
+
+
+def of_sdf(path: Path, rng: np.random.Generator) -> tuple[str, float | None, str]:
+    """Eigenvalues of the mass matrix at zero beside those of a URDF of the same name."""
+    try:
+        model = lw.load(path, mimic="independent")
+    except lw.InputError as error:
+        return "refused", None, str(error)
+    twin = path.with_suffix(".urdf")
+    try:
+        other = lw.load(
+            twin, mimic="independent", floating_base=model.joint_types[:1] == ["floating"]
+        )
+    except lw.InputError as error:
+        return "loads, no witness", None, str(error)
+    if other.nv != model.nv or model.nv == 0:
+        return "loads, no witness", None, f"{model.nv} degrees of freedom, {other.nv} of the URDF"
+    ours, theirs = (
+        np.linalg.eigvalsh(lw.mass_matrix(m, m.neutral_configuration())) for m in (model, other)
+    )
+    apart = difference(ours, theirs)
     return ("agrees" if apart < AGREE else "differs"), apart, ""
 
 
@@ -137,7 +163,7 @@ def main() -> int:
     rng = np.random.default_rng(0)
     rows = []
     for kind, paths, check in zip(
-        ("URDF", "MJCF"), found_in(folders), (of_urdf, of_mjcf), strict=True
+        KINDS, found_in(folders), (of_urdf, of_sdf, of_mjcf), strict=True
     ):
         for path in paths:
             try:
@@ -149,7 +175,7 @@ def main() -> int:
     hows = ("agrees", "differs", "loads, no witness", "refused", "fails")
     print("| files | found | agree | differ | load, without a witness | refused | fail |")
     print("|---|---|---|---|---|---|---|")
-    for kind in ("URDF", "MJCF"):
+    for kind in KINDS:
         numbers = [counts[kind, how] for how in hows]
         print(f"| {kind} | {sum(numbers)} | " + " | ".join(map(str, numbers)) + " |")
     print()

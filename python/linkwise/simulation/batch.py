@@ -13,7 +13,7 @@ from linkwise._core import Frame, InputError, Model, as_floats
 from linkwise.base import Array
 from linkwise.io.complaint import shown
 from linkwise.loads.engineering import joint_directions
-from linkwise.notes import tell, warning_attrs, warnings_of
+from linkwise.notes import Ignored, tell, warning_attrs, warnings_of
 from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
@@ -118,6 +118,14 @@ def _dataset(
     )
 
 
+def _forces_in_doubt(members: int, worst: int, text: str, count: int) -> list[Ignored]:
+    """What is said of forces of large gain that the steps do not resolve."""
+    if not members:
+        return []
+    said = text if count == 1 else f"in {members} of {count} members; in member {worst} {text}"
+    return [Ignored("", "forces", said)]
+
+
 def simulate_batch(
     model: Model | Sequence[Model],
     *,
@@ -207,7 +215,7 @@ def simulate_batch(
     )
     ignored = warnings_of(*models)
     tell(ignored, reading=False)
-    columns, flat, endings, interrupted = _core.simulate_members(
+    columns, flat, endings, interrupted, doubt = _core.simulate_members(
         simulations,
         q0=rows["q0"],
         v0=rows["v0"],
@@ -221,7 +229,8 @@ def simulate_batch(
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
     early = sum(ending.outcome != "converged" for ending in endings)
     attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)
-    attrs |= driven_attrs(by_joint, by_name) | warning_attrs([*notes, *ignored])
+    noticed = _forces_in_doubt(*doubt, count)
+    attrs |= driven_attrs(by_joint, by_name) | warning_attrs([*noticed, *notes, *ignored])
     attrs |= {"outcome": "converged" if not early else f"{early} of {count} members ended early"}
     dataset = dataset.assign_attrs({name: plain(value) for name, value in attrs.items()})
     if interrupted:

@@ -19,8 +19,11 @@ Start members_of(const Start& all, const Model& m, size_t first, size_t count) {
 std::vector<Ending> simulate_batch(std::span<const Simulation* const> simulations,
                                    const Start& start, std::span<const double> times,
                                    const Sample& samples, const Executor& executor,
-                                   const std::function<bool()>& go_on, double* extremes) {
+                                   const std::function<bool()>& go_on, double* extremes,
+                                   ForcesOfMembers* doubt) {
   std::vector<Ending> endings(start.members);
+  std::vector<double> errors(start.members);
+  std::vector<std::string> texts(start.members);
   const size_t per_simulation = start.members / simulations.size();
   for (size_t k = 0; k < simulations.size(); ++k) {
     Setup& setup = *simulations[k]->shared_setup();
@@ -51,11 +54,18 @@ std::vector<Ending> simulate_batch(std::span<const Simulation* const> simulation
     }
     for (size_t i = 0; i < n; ++i) {
       endings[first + i] = group.ending(i);
+      errors[first + i] = group.force_error(i);
+      if (errors[first + i] > 0) texts[first + i] = group.force_doubt(i);
       if (!extremes) continue;
       const std::vector<double> found = group.extremes(i);
       std::copy(found.begin(), found.end(), extremes + (first + i) * found.size());
     }
   });
+  if (doubt) {
+    doubt->members = std::count_if(errors.begin(), errors.end(), [](double e) { return e > 0; });
+    doubt->worst = std::max_element(errors.begin(), errors.end()) - errors.begin();
+    if (!errors.empty()) doubt->text = texts[doubt->worst];
+  }
   return endings;
 }
 

@@ -4,6 +4,7 @@
 // and groups share nothing, so the number of threads does not change a bit.
 #include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "linkwise/exec/executor.hpp"
@@ -11,15 +12,22 @@
 
 namespace linkwise {
 
+/// Members whose forces of large gain are not known well.
+struct ForcesOfMembers {
+  size_t members = 0, worst = 0;
+  std::string text;  ///< Simulation::force_doubt() of the worst
+};
+
 /// Simulates from time 0 on. Model, drives, wrenches and numerics are those of the simulations,
 /// which check_members() must take and which share the members of the start equally. Arrays of
 /// `samples` are [member][time][...], NaN after a member's end: a member that fails ends alone.
 /// extremes: of each member, rows of Extremes::size(); null: not kept, which is up to the
 /// simulations. `go_on` is asked at every step, from any thread; once it is false, members under
-/// way end as `interrupted`.
+/// way end as `interrupted`. doubt: see ForcesOfMembers; null: not asked.
 std::vector<Ending> simulate_batch(std::span<const Simulation* const> simulations,
                                    const Start& start, std::span<const double> times,
                                    const Sample& samples, const Executor& executor,
-                                   const std::function<bool()>& go_on, double* extremes = nullptr);
+                                   const std::function<bool()>& go_on, double* extremes = nullptr,
+                                   ForcesOfMembers* doubt = nullptr);
 
 }  // namespace linkwise

@@ -6,8 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "linkwise/forces/coordinate_forces.hpp"
-
 namespace linkwise {
 namespace {
 
@@ -43,41 +41,11 @@ ForceAccuracy::ForceAccuracy(const Setup& setup) : setup_(setup) {
   const IntegratorOptions& o = setup.options.integration;
   relative_ = o.relative_tolerance > 0 ? o.relative_tolerance : o.tolerance;
   absolute_ = o.absolute_tolerance > 0 ? o.absolute_tolerance : o.tolerance;
-  for (const Element& e : setup.driven().elements)
-    if (!e.prescribed) add_rows(e);
+  for (const GainRow& row : gain_rows(setup)) rows_.push_back({row});
 }
 
-void ForceAccuracy::add_rows(const Element& e) {
-  const Model& m = *setup_.model;
-  const Drive& drive = setup_.drives[e.joint];
-  const bool scalar = has_scalar_coordinates(e), pd = drive.kind == DriveKind::pd;
-  const int turning = info_of(e.kind).turning;
-  for (int k = 0; k < e.nv; ++k) {
-    const int i = e.v + k;
-    const auto at = [&](DofProperty p) { return m.dof_values(p)[i]; };
-    Row row{.joint = e.joint, .q = scalar ? e.q + k : -1, .v = i, .group = i};
-    if (k < turning) row.group = e.v, row.width = turning;
-    if (k < turning || e.kind == ElementKind::prismatic) row.unit = "N";
-    row.damping = at(DofProperty::damping) + (pd ? drive.kd : 0);
-    row.friction = at(DofProperty::friction);
-    row.friction_velocity = at(DofProperty::friction_velocity);
-    if (scalar) {
-      row.stiffness = at(DofProperty::stiffness) + (pd ? drive.kp : 0);
-      row.stop = at(DofProperty::limit_stiffness);
-      row.stop_damping = at(DofProperty::limit_damping);
-      row.lower = at(DofProperty::lower);
-      row.upper = at(DofProperty::upper);
-    }
-    if (row.damping != 0 || row.friction > 0 || row.stiffness != 0 || row.stop > 0)
-      rows_.push_back(row);
-  }
-}
-
-ForceAccuracy::Contact ForceAccuracy::contact(const Row& row, const double* q,
-                                              const double* v) const {
-  const double above = q[row.q] - row.upper, below = row.lower - q[row.q];
-  if (above > below) return {above, v[row.v], 1};
-  return {below, -v[row.v], -1};
+Contact ForceAccuracy::contact(const Row& row, const double* q, const double* v) const {
+  return linkwise::contact(row, q[row.q], v[row.v]);
 }
 
 /// ahead: a stop that is near counts before it is touched.
@@ -91,7 +59,7 @@ ForceAccuracy::Gains ForceAccuracy::gains(const Row& row, const double* q, const
   if (!(row.stop > 0)) return out;
   const Contact at = contact(row, q, v);
   if (!(at.depth > 0) && !(ahead && row.near && at.speed > 0)) return out;
-  const double stiffness = row.stop * std::max(0.0, 1 + row.stop_damping * at.speed);
+  const double stiffness = stop_stiffness(row, at.speed);
   out.position += stiffness;
   if (at.depth > 0 && row.stop_damping > 0) out.bend = 1 / row.stop_damping;
   if (stiffness > 0) out.rate += row.stop * row.stop_damping * std::max(0.0, at.depth);
@@ -126,7 +94,10 @@ void ForceAccuracy::accepted(double t, const State& state) {
     double force = 0;
     for (int i = row.group; i < row.group + row.width; ++i) force = std::hypot(force, state.tau[i]);
     // Before anything moves, drives may not know yet what they will have to hold.
-    if (!started_) force = std::max(force, std::abs(state.dv[row.v]) * inertia(row, state.q));
+    if (!started_) {
+      row.at_start = inertia(row, state.q);
+      force = std::max(force, std::abs(state.dv[row.v]) * row.at_start);
+    }
     if (force > row.largest && std::isfinite(force)) row.largest = force;
     if (row.stop > 0) approach(row, t, state);
     measure(row, t, state);
@@ -153,7 +124,7 @@ double ForceAccuracy::inertia(const Row& row, const double* q) {
 
 /// Whether a stop that is met with such a speed is seen by the usual error test.
 bool ForceAccuracy::is_resolved(const Row& row, double speed, double error) const {
-  const double stiffness = row.stop * std::max(0.0, 1 + row.stop_damping * speed);
+  const double stiffness = stop_stiffness(row, speed);
   const double blow = std::max(0.0, speed) * std::sqrt(stiffness * row.inertia);
   return error * stiffness <= share * std::max(row.largest, blow);
 }
@@ -180,7 +151,7 @@ void ForceAccuracy::approach(Row& row, double t, const State& state) {
   }
   if (!was_near) row.inertia = inertia(row, state.q);
   if (is_resolved(row, speed, row.usual_error)) return;
-  const double stiffness = row.stop * std::max(0.0, 1 + row.stop_damping * speed);
+  const double stiffness = stop_stiffness(row, speed);
   row.near = time <= in_reach * std::sqrt(row.inertia / stiffness);
   if (!row.near) step_limit_ = std::min(step_limit_, t + time / 2);
 }
@@ -259,18 +230,16 @@ std::string ForceAccuracy::doubt() const {
   const Row* worst = nullptr;
   double ratio = doubtful;
   for (const Row& row : rows_)
-    if (row.error > ratio * row.largest) ratio = row.error / row.largest, worst = &row;
+    if (row.error > ratio * row.largest && row.error > no_acceleration * row.at_start)
+      ratio = row.error / row.largest, worst = &row;
   if (!worst) return {};
-  char text[400];
-  std::snprintf(text, sizeof text,
-                "the force of joint '%.80s' may be wrong by %.2g %s, where the largest is %.2g %s, "
-                "at t = %.4g s: so much do its stop, drive, spring, damping or friction make of "
-                "the error of a step; ",
-                setup_.model->joints[worst->joint].name.c_str(), worst->error, worst->unit,
-                worst->largest, worst->unit, worst->error_time);
-  std::string out = text;
+  const ForceDoubt found{worst, worst->error, worst->largest, worst->error_time};
+  const std::string out =
+      found.text(*setup_.model) +
+      "so much do its stop, drive, spring, damping or friction make of the error of a step; ";
   if (worst->error_of_rounding > doubtful * worst->largest)
     return out + "no tolerance helps, because it is rounding: make them softer";
+  char text[120];
   std::snprintf(text, sizeof text, "a tolerance %.1g times smaller would do, or make them softer",
                 ratio / doubtful);
   return out + text;

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "linkwise/dynamics/mobility.hpp"
-#include "linkwise/simulate/setup.hpp"
+#include "linkwise/simulate/force_gains.hpp"
 
 namespace linkwise {
 
@@ -59,24 +59,15 @@ class ForceAccuracy {
   std::string doubt() const;
 
  private:
-  struct Contact {
-    double depth, speed;  ///< into the nearer stop; depth is negative in front of it
-    double side;          ///< 1: the upper one
-  };
-  /// What acts along one coordinate and rate.
-  struct Row {
-    int joint, q, v;           ///< q: -1 where it is no angle or distance
-    int group = 0, width = 1;  ///< first rate, and how many, whose torques are one vector
-    double stiffness = 0, damping = 0, friction = 0, friction_velocity = 1;
-    double stop = 0, stop_damping = 0, lower = -infinity, upper = infinity;
+  struct Row : GainRow {
     Contact last{};          ///< at the time accepted last
     double usual_error = 0;  ///< of the coordinate, then
     double inertia = 0;      ///< that the stop feels, once it is near
+    double at_start = 0;     ///< the same, at the start
     bool near = false;       ///< a stop is in reach of the next step
     double largest = 0;      ///< force met so far
     double error = 0;        ///< largest that the error test let pass of a force
     double error_time = 0, error_of_rounding = 0;
-    const char* unit = "N m";
   };
   struct Gains {
     double position = 0, rate = 0;
@@ -84,7 +75,6 @@ class ForceAccuracy {
     double coming = 0;       ///< the force of a blow that is on its way
   };
 
-  void add_rows(const Element& e);
   Contact contact(const Row& row, const double* q, const double* v) const;
   Gains gains(const Row& row, const double* q, const double* v, bool ahead) const;
   void approach(Row& row, double t, const State& state);

@@ -77,6 +77,8 @@ void Simulation::start(double t0, const Start& start) {
   for (size_t i = 0; i < members_; ++i)
     parent_axes_.from_child(y.data() + i * nq(), rates_in(y.data()) + i * nv());
   integrator_->start(t0, y);
+  integrator_->interpolate(t0, y);
+  watch_start(t0, y.data());
 }
 
 void Simulation::make_methods(double t0) {
@@ -103,15 +105,6 @@ void Simulation::make_methods(double t0) {
   }
   method_ = make_dynamics(setup_->driven(), integrated);
   output_method_ = make_dynamics(setup_->driven(), options.dynamics);
-}
-
-/// Where steps are chosen, by a test that sees the joints' own rates.
-void Simulation::watch_forces() {
-  accuracy_.reset();
-  const SimulationOptions& options = setup_->options;
-  if (members_ > 1 || options.state || find_integrator(options.integrator).fixed_step) return;
-  accuracy_.emplace(*setup_);
-  if (!accuracy_->any()) accuracy_.reset();
 }
 
 bool Simulation::follows_error_test() const {
@@ -237,13 +230,8 @@ std::string Simulation::described(Outcome outcome, int body) const {
 Outcome Simulation::evaluate(double t, const double* y, double* ydot) {
   if (solver_tolerance_) solver_tolerance_->set(t);
   const Outcome outcome = evaluate_by(method_.get(), t, y, ydot);
-  if (accuracy_) keep_acting(ydot);
+  if (outcome == Outcome::converged) watch_evaluation(t, ydot);
   return outcome;
-}
-
-void Simulation::keep_acting(const double* ydot) {
-  acting_.assign(rates_in(ydot), rates_in(ydot) + nv());
-  acting_.insert(acting_.end(), forces_->tau(0), forces_->tau(0) + nv());
 }
 
 /// Warm starts, the trace of evaluations and the reason of a failure stay what they are.
@@ -304,36 +292,7 @@ void Simulation::accepted(double t, const double* y) {
   if (method_) method_->accepted(t);
   if (loops_) coasting_.accepted();
   if (passive_loops_) count_turns(t, y);
-  if (accuracy_) weigh_forces(t, y);
-}
-
-void Simulation::weigh_forces(double t, const double* y) {
-  scale_.resize(size());
-  error_scale(y, scale_.data());
-  const double* dv = acting_.data();
-  accuracy_->accepted(t, {y, rates_in(y), dv, dv + nv(), scale_.data()});
-}
-
-void Simulation::limit_errors(const double* y, double* allowed) const {
-  if (accuracy_) accuracy_->limit_errors(y, rates_in(y), allowed);
-}
-
-bool Simulation::retakes(double begin, double end, const double* y,
-                         const std::function<void(double, double*)>& state) {
-  if (!accuracy_) return false;
-  return accuracy_->passes_stop(begin, end, y, rates_in(y), state);
-}
-
-double Simulation::step_limit(double t) {
-  if (accuracy_ && !accuracy_->started()) {
-    std::vector<double> y(size()), ydot(size());
-    integrator_->interpolate(t, y);
-    if (evaluate_aside(t, y.data(), ydot.data()) != Outcome::converged) ydot.assign(size(), 0.0);
-    keep_acting(ydot.data());
-    weigh_forces(t, y.data());
-  }
-  const double limit = step_limits_->after(t);
-  return accuracy_ ? std::min(limit, accuracy_->step_limit(t)) : limit;
+  watch_step(t, y);
 }
 
 /// The same motion is held as well many turns later or far from the origin: angles are weighed by

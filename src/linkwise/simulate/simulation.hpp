@@ -12,6 +12,7 @@
 #include "linkwise/simulate/applied_forces.hpp"
 #include "linkwise/simulate/coasting.hpp"
 #include "linkwise/simulate/extremes.hpp"
+#include "linkwise/simulate/fixed_step_forces.hpp"
 #include "linkwise/simulate/force_accuracy.hpp"
 #include "linkwise/simulate/parent_axes.hpp"
 #include "linkwise/simulate/quantity.hpp"
@@ -75,8 +76,10 @@ class Simulation : private OdeSystem {
   SimulationStatistics statistics() const;
   /// As Integrator::stiffness().
   std::string stiffness() const { return integrator_ ? integrator_->stiffness() : std::string(); }
-  /// As ForceAccuracy::doubt().
-  std::string force_doubt() const { return accuracy_ ? accuracy_->doubt() : std::string(); }
+  /// One line where forces of large gain are not known well, with the remedy; else empty.
+  std::string force_doubt(size_t member = 0) const;
+  /// With fixed steps: how much of the largest force that is; 0 where they are known well.
+  double force_error(size_t member) const;
   /// Ends what still runs.
   void stop(Outcome outcome) { end_all({outcome, integrator_->time(), "", describe(outcome)}); }
 
@@ -123,6 +126,9 @@ class Simulation : private OdeSystem {
   void watch_forces();
   void keep_acting(const double* ydot);
   void weigh_forces(double t, const double* y);
+  void watch_start(double t, const double* y);
+  void watch_evaluation(double t, const double* ydot);
+  void watch_step(double t, const double* y);
   void close_loops(const std::vector<std::string>& hold);
   void begin_coasting();
   bool follows_error_test() const;
@@ -168,7 +174,8 @@ class Simulation : private OdeSystem {
   size_t members_ = 1;
   std::optional<AppliedForces> forces_;
   std::optional<StepLimits> step_limits_;
-  std::optional<ForceAccuracy> accuracy_;  ///< of one member, with an error test
+  std::optional<ForceAccuracy> accuracy_;      ///< of one member, with an error test
+  std::vector<FixedStepForces> fixed_forces_;  ///< of each member; none: steps are chosen
   /// Of one member; loads at output times are computed apart, to the fixed tolerance.
   std::unique_ptr<DynamicsMethod> method_, output_method_;
   std::unique_ptr<DynamicsMethod> aside_method_, work_method_;  ///< made when first needed

@@ -1,0 +1,65 @@
+#include "linkwise/simulate/force_gains.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "linkwise/forces/coordinate_forces.hpp"
+
+namespace linkwise {
+namespace {
+
+void add_rows(const Setup& setup, const Element& e, std::vector<GainRow>& rows) {
+  const Model& m = *setup.model;
+  const Drive& drive = setup.drives[e.joint];
+  const bool scalar = has_scalar_coordinates(e), pd = drive.kind == DriveKind::pd;
+  const int turning = info_of(e.kind).turning;
+  for (int k = 0; k < e.nv; ++k) {
+    const int i = e.v + k;
+    const auto at = [&](DofProperty p) { return m.dof_values(p)[i]; };
+    GainRow row{.joint = e.joint, .q = scalar ? e.q + k : -1, .v = i, .group = i};
+    if (k < turning) row.group = e.v, row.width = turning;
+    if (k < turning || e.kind == ElementKind::prismatic) row.unit = "N";
+    row.damping = at(DofProperty::damping) + (pd ? drive.kd : 0);
+    row.friction = at(DofProperty::friction);
+    row.friction_velocity = at(DofProperty::friction_velocity);
+    if (scalar) {
+      row.stiffness = at(DofProperty::stiffness) + (pd ? drive.kp : 0);
+      row.stop = at(DofProperty::limit_stiffness);
+      row.stop_damping = at(DofProperty::limit_damping);
+      row.lower = at(DofProperty::lower);
+      row.upper = at(DofProperty::upper);
+    }
+    if (row.damping != 0 || row.friction > 0 || row.stiffness != 0 || row.stop > 0)
+      rows.push_back(row);
+  }
+}
+
+}  // namespace
+
+std::vector<GainRow> gain_rows(const Setup& setup) {
+  std::vector<GainRow> rows;
+  for (const Element& e : setup.driven().elements)
+    if (!e.prescribed) add_rows(setup, e, rows);
+  return rows;
+}
+
+Contact contact(const GainRow& row, double q, double v) {
+  const double above = q - row.upper, below = row.lower - q;
+  if (above > below) return {above, v, 1};
+  return {below, -v, -1};
+}
+
+double stop_stiffness(const GainRow& row, double speed) {
+  return row.stop * std::max(0.0, 1 + row.stop_damping * speed);
+}
+
+std::string ForceDoubt::text(const Model& model) const {
+  char text[400];
+  std::snprintf(text, sizeof text,
+                "the force of joint '%.80s' may be wrong by %.2g %s, where the largest is %.2g %s, "
+                "at t = %.4g s: ",
+                model.joints[row->joint].name.c_str(), error, row->unit, largest, row->unit, time);
+  return text;
+}
+
+}  // namespace linkwise
