@@ -3,6 +3,7 @@
 
 #include "bind.hpp"
 #include "linkwise/kinematics/loop_states.hpp"
+#include "report.hpp"
 #include "states.hpp"
 
 namespace linkwise::bindings {
@@ -28,6 +29,7 @@ void bind_loop_gaps(nb::module_& m) {
             }
           }
         });
+        check_result(out.data, s.count * size(model.n_loops()) * 2);
         return out.array;
       },
       "model"_a, "q"_a,
@@ -39,7 +41,8 @@ Args:
     q: positions (..., nq) [rad, m].
 
 Raises:
-    InputError: q has another shape.)");
+    InputError: q has another shape.
+    NumericsError: a gap is not finite.)");
 }
 
 }  // namespace linkwise::bindings

@@ -315,3 +315,9 @@ def test_a_linkage_stretched_straight_is_singular():
     assert lw.indeterminacy(model, np.zeros(3)).mobility == 2
     with pytest.raises(lw.NumericsError, match="contradicts itself"):
         lw.forward_dynamics(model, np.zeros(3), [1.0, -2.0, 0.0])
+
+
+def test_gaps_that_overflow_are_no_numbers_to_go_by():
+    far = lw.scenes.chain(2).with_rod("rod", "ground", "link_2", length=1e200, point=(1e200, 0, 0))
+    with pytest.raises(lw.NumericsError, match="not finite"):
+        lw.loop_gaps(far, far.initial_configuration())

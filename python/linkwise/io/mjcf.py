@@ -72,6 +72,12 @@ def read_mjcf(
         raise InputError(f"{shorten(os.fspath(path), 400)}: {text}") from None
 
 
+#: What MuJoCo says where its own messages fail, as with `%s` for a type. It keeps a lock then, so
+#: that the next reading would wait for ever.
+_BROKE = "Caught an unknown exception!"
+_broken_by: list[str] = []
+
+
 def compile_mjcf(path: str | os.PathLike[str], xml: str | None = None) -> Any:
     """The mujoco.MjModel of a file, or of a text that ``path`` only names.
 
@@ -86,6 +92,9 @@ def compile_mjcf(path: str | os.PathLike[str], xml: str | None = None) -> Any:
     if file_name(path) != os.fspath(path):
         problem = "its name is not UTF-8, which MuJoCo cannot open"
         complain(path, "model file", problem, "rename it")
+    if _broken_by:
+        problem = f"MuJoCo cannot read any more: its reader broke on {_broken_by[0]}"
+        complain(path, "model file", problem, "correct that file, and start a new process")
     try:
         with without_warnings():
             if xml is None:
@@ -93,6 +102,8 @@ def compile_mjcf(path: str | os.PathLike[str], xml: str | None = None) -> Any:
             else:
                 mj_model = mujoco.MjModel.from_xml_string(xml)
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        if str(error) == _BROKE:
+            _broken_by.append(shorten(os.fspath(path), 400))
         complain(
             path,
             "model file",

@@ -106,6 +106,8 @@ def parse_quantity(text: str) -> tuple[float, str | None]:
 def check_dimension(dimension: str | None, *allowed: str) -> None:
     """ValueError if a unit was given and its dimension is none of ``allowed``."""
     if dimension is not None and dimension not in allowed:
+        if not known_units(*allowed):
+            raise ValueError(f"has a unit of {dimension}; give the number alone")
         wanted = " or ".join(f"an {a}" if a[0] in "aeiou" else f"a {a}" for a in allowed)
         raise ValueError(
             f"has a unit of {dimension} where {wanted} belongs; use one of {known_units(*allowed)}"

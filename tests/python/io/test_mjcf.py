@@ -7,7 +7,7 @@ import pytest
 
 import linkwise as lw
 from helpers import mujoco_states
-from linkwise.io import mjcf_state
+from linkwise.io import mjcf, mjcf_state
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -322,3 +322,26 @@ def test_missing_extra_is_one_line(write, complaint, monkeypatch):
     assert complaint(lw.load, write(MACHINE)) == (
         ": model file: MJCF needs the package mujoco; pip install 'linkwise[mjcf]'"
     )
+
+
+def test_a_reader_that_broke_is_told_and_does_not_wait_for_ever(monkeypatch):
+    """MuJoCo keeps a lock where its own message fails, as it may where a geom's type is %s.
+
+    The failure is played, because it depends on what happens to be in memory.
+    """
+    body = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
+    monkeypatch.setattr(mjcf, "_broken_by", [])
+
+    class Broken:
+        @staticmethod
+        def from_xml_string(text):
+            raise ValueError("Caught an unknown exception!")
+
+    with monkeypatch.context() as played:
+        played.setattr(mujoco, "MjModel", Broken)
+        with pytest.raises(lw.InputError, match="MuJoCo refuses it"):
+            lw.load(body)
+    with pytest.raises(lw.InputError, match="start a new process"):
+        lw.load(body)
+    monkeypatch.setattr(mjcf, "_broken_by", [])
+    assert lw.load(body).nv == 1

@@ -166,6 +166,10 @@ offset = 0.02
         ("[coupling.x]\nfactors = { shoulder = 1, slid = 1 }\n", "coupling.x: "),
         ("[coupling.x]\nfactors = {}\n", "coupling.x.factors: "),
         ('[coupling.x]\nfactors = { slide = "1 m" }\n', "coupling.x.factors.slide: "),
+        (
+            '[coupling.x]\nfactors = { slide = 1 }\noffset = "1 m"\n',
+            "coupling.x.offset: has a unit of length; give",
+        ),
     ],
 )
 def test_what_is_wrong_with_rods_and_couplings(write, complaint, text, said):
