@@ -8,8 +8,9 @@
 namespace linkwise {
 namespace {
 
-/// Of directions that are nearly dependent: a thousandth from a singular position.
-constexpr double weak_pivot = 1e-6;
+/// Of directions that are nearly dependent: some thousandths from a singular position. Closer to it
+/// noise takes over, measured on rows of four-bars; further from it coasting is less accurate.
+constexpr double weak_pivot = 1e-5;
 /// Pivots of the scaled Lambda below this are zero: rounding errors leave 1e-16 of a zero.
 constexpr double null_pivot = 1e-10;
 
@@ -157,7 +158,7 @@ bool ArticulatedLoops::evaluate(const SweepInput<double>& in, double* du, double
     if (failed_body() >= 0) return false;
     for (int g = stage.first_group; g < stage.last_group; ++g) {
       carry(in, g);
-      factor(g);
+      factor(g, with_loads);
       if (groups_[g].top >= 0) reduce_top(g);
     }
   }
@@ -245,7 +246,7 @@ void ArticulatedLoops::carry(const SweepInput<double>& in, int g) {
 }
 
 /// D, and the factor of Lambda in coordinates in which D is 1.
-void ArticulatedLoops::factor(int g) {
+void ArticulatedLoops::factor(int g, bool with_loads) {
   const LoopGroup& group = groups_[g];
   LoopSystem& system = systems_[g];
   for (size_t m = 0; m < group.members.size(); ++m) {
@@ -266,12 +267,9 @@ void ArticulatedLoops::factor(int g) {
       for (int j = 0; j <= i; ++j) D[packed(i, j)] = dot(a, on_a[j]) + dot(b, on_b[j]);
     }
   }
-  system.factor(null_);
+  system.factor(null_, with_loads);
   report_.rows += group.rows;
-  if (system.rank() < 0 || report_.rank < 0)
-    report_.rank = -1;
-  else
-    report_.rank += system.rank();
+  report_.rank += system.rank();
   report_.strong += system.rank_above(weak_pivot);
   report_.smallest_pivot = std::min(report_.smallest_pivot, system.smallest_pivot());
 }

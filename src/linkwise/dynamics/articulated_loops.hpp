@@ -56,7 +56,7 @@ class ArticulatedLoops {
   void place_forces(const SweepInput<double>& in, int g);
   void place_coupling(const SweepInput<double>& in, int g, const LoopGroup::Member& member);
   double yielding_of(const LoopGroup::Member& member) const;
-  void factor(int g);
+  void factor(int g, bool with_loads);
   void reduce_top(int g);
   void solve_forces(const SweepInput<double>& in, int g, bool with_loads);
   void add_known_wrenches(const SweepInput<double>& in);

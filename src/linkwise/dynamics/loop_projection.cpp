@@ -9,10 +9,13 @@ namespace {
 /// Gaps below this share of a loop's length are closed: rounding leaves as much.
 constexpr double closed = 1e-15;
 constexpr int most_steps = 4;
-/// Directions that are held by less than the first are left to drift until the machine has left a
+/// Directions that are held by less than the second are left to drift until the machine has left a
 /// singular position: what closes them there is not small. Where masses are so unlike that some are
-/// never held by more, the second counts.
-constexpr double weak = 1e-6, null = 1e-12;
+/// never held by more, the last counts. Those below the first are closed only once they are open by
+/// more than `drift`. At a distance d from a singular position a rounding error of a gap moves
+/// coordinates by 1/d of it, rates by 1/d^2, and accelerations by 1/d^3: closing it on every step
+/// is a noise that small tolerances do not bear.
+constexpr double faint = 1e-3, weak = 1e-5, null = 1e-12, drift = 1e-11;
 
 }  // namespace
 
@@ -37,6 +40,7 @@ LoopProjection::LoopProjection(const Model& model)
       kernel_(model),
       asked_(6 * static_cast<size_t>(model.n_loops()) + model.n_couplings()),
       weakest_(weak),
+      faintest_(weak),
       du_(model.nv()) {}
 
 LoopReport LoopProjection::report_at(const double* q) {
@@ -46,28 +50,28 @@ LoopReport LoopProjection::report_at(const double* q) {
 }
 
 void LoopProjection::find_rank(const double* q) {
-  constexpr double beside = 0.03;  // rad, or m
-  LoopReport report = report_at(q);
-  full_ = report.strong;
-  int rank = report.rank;
+  LoopReport best = report_at(q);
   std::vector<double> other, aside(model_.nv());
-  for (const double sign : {1.0, -1.0}) {
+  at_start_ = best.rank;
+  for (const double beside : {0.03, -0.03}) {  // rad, or m
     other.assign(q, q + model_.nq());
     for (const Element& e : model_.elements)
       for (int i = 0; i < e.nv && !e.prescribed; ++i)
-        aside[e.v + i] = sign * beside * std::cos(2.4 * (e.v + i));
+        aside[e.v + i] = beside * std::cos(2.4 * (e.v + i));
     move_by(model_, aside.data(), other.data());
     for (int k = 0; k < 20 && gap(other.data()) > closed; ++k) {
       if (!close(other.data(), null, du_.data())) break;
       move_by(model_, du_.data(), other.data());
     }
     if (!(gap(other.data()) < 1e-11)) continue;
-    report = report_at(other.data());
-    if (report.strong <= full_) continue;
-    full_ = report.strong;
-    rank = report.rank;
+    const LoopReport report = report_at(other.data());  // a long row of loops may stay singular
+    if (report.strong > best.strong ||
+        (report.strong == best.strong && report.smallest_pivot > best.smallest_pivot))
+      best = report;
   }
-  weakest_ = full_ < rank ? null : weak;
+  full_ = best.strong;
+  weakest_ = full_ < best.rank ? null : weak;
+  faintest_ = std::max(weakest_, std::min(faint, 0.1 * best.smallest_pivot));
 }
 
 /// The root of the sum of squares of residuals over their loops' lengths; what would undo them into
@@ -125,17 +129,23 @@ Outcome LoopProjection::project(double* q, double* v) {
   const double start = gap(q_.data());
   if (!std::isfinite(start)) return Outcome::not_finite;
   double open = start;
-  for (int k = 0; k < most_steps && open > closed; ++k) {
-    if (!close(q_.data(), weakest_, du_.data())) return Outcome::not_positive_definite;
-    move_by(model_, du_.data(), q_.data());
-    const double before = open;
-    open = gap(q_.data());
-    if (!(open < 0.5 * before)) break;  // rounding, or what weak directions leave
+  for (const double least : {faintest_, weakest_}) {
+    for (int k = 0; k < most_steps && open > closed; ++k) {
+      if (!close(q_.data(), least, du_.data())) return Outcome::not_positive_definite;
+      move_by(model_, du_.data(), q_.data());
+      const double before = open;
+      open = gap(q_.data());
+      if (!(open < 0.5 * before)) break;  // rounding, or what weak directions leave
+    }
+    if (!(open > drift)) break;
   }
   if (!(open <= std::max(2 * start, 1e-10))) return Outcome::singular_position;
   if (v) {
     v_.assign(v, v + model_.nv());
-    if (!std::isfinite(stop(q_.data(), weakest_, v_.data()))) return Outcome::not_finite;
+    for (const double least : {faintest_, weakest_}) {
+      if (!std::isfinite(stop(q_.data(), least, v_.data()))) return Outcome::not_finite;
+      if (!(slip(q_.data(), v_.data()) > drift)) break;
+    }
     std::copy(v_.begin(), v_.end(), v);
   }
   std::copy(q_.begin(), q_.end(), q);

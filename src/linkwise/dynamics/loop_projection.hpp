@@ -5,6 +5,7 @@
 //     q <- q (+) -H^-1 K^T (K H^-1 K^T)^+ g,     u <- u - H^-1 K^T (K H^-1 K^T)^+ (K u - k_t) .
 // Each is one response of the recursion at rest. What given motions ask for is in g and in the slip
 // K u - k_t of the loop joints already, since these are taken with all rates.
+#include <algorithm>
 #include <vector>
 
 #include "linkwise/base/outcome.hpp"
@@ -21,6 +22,9 @@ class LoopProjection {
   /// The most of them is what they hold anywhere but in singular positions.
   void find_rank(const double* q);
   int full_rank() const { return full_; }
+  /// How many of them are lost at q itself, where the machine may move on in several ways. Of a
+  /// long row of loops some may be missed.
+  int lost_at_start() const { return std::max(0, full_ - at_start_); }
 
   /// q [nq], v [nv]; v may be null. Any outcome but `converged` leaves both as they were.
   Outcome project(double* q, double* v);
@@ -46,8 +50,9 @@ class LoopProjection {
   LoopStates states_;
   ArticulatedLoops kernel_;
   std::vector<double> asked_;
-  int full_ = 0;
-  double weakest_;  ///< directions that hold less are left alone
+  int full_ = 0, at_start_ = 0;
+  double weakest_;   ///< directions that hold less are left alone
+  double faintest_;  ///< and below this, as long as they are hardly open
   std::vector<double> du_, q_, v_;
 };
 

@@ -5,7 +5,7 @@ namespace linkwise {
 /// What an evaluation saw of the loops.
 struct LoopReport {
   int rows = 0;               ///< directions that loop joints and couplings hold
-  int rank = 0;               ///< how many are independent; -1: some group is too large to count
+  int rank = 0;               ///< how many are independent
   int strong = 0;             ///< how many are far from dependent
   double smallest_pivot = 1;  ///< of what counts as independent, over the largest
   /// By how much dependent constraints contradict each other, over what all ask for: rounding

@@ -58,13 +58,13 @@ void LoopSystem::scale_matrix() {
   }
 }
 
-void LoopSystem::factor(double null) {
+void LoopSystem::factor(double null, bool least) {
   for (size_t m = 0; m < blocks_.size(); ++m) cholesky_factor(blocks_[m].n, metric_[m].data(), 0.0);
   scale_matrix();
-  if (is_small())
-    factor_exactly(null);
-  else
-    shifted_.factor(profile_, scaled_);
+  if (is_small()) return factor_exactly(null);
+  banded_.factor(profile_, blocks_, scaled_, null);
+  least_ = least && banded_.rank() < profile_.size();
+  if (least_) shifted_.factor(profile_, scaled_);
 }
 
 void LoopSystem::factor_exactly(double null) {
@@ -80,9 +80,22 @@ void LoopSystem::factor_exactly(double null) {
 
 double LoopSystem::solve(std::vector<double>& x) {
   to_scaled(x.data());
-  const double missed = is_small() ? exact_.solve(x.data(), x.data())
-                                   : shifted_.solve(profile_, scaled_, x.data(), x.data());
+  const double missed = is_small() ? exact_.solve(x.data(), x.data()) : solve_large(x.data());
   from_scaled(x.data());
+  return missed;
+}
+
+/// What the shift leaves undone of the least f is done without it.
+double LoopSystem::solve_large(double* x) {
+  if (!least_) return banded_.solve(profile_, scaled_, x, x);
+  const auto n = static_cast<size_t>(profile_.size());
+  rest_.assign(x, x + n);
+  product_.resize(n);
+  shifted_.solve(profile_, scaled_, x, x);
+  multiply(profile_, scaled_.data(), x, product_.data());
+  for (size_t i = 0; i < n; ++i) rest_[i] -= product_[i];
+  const double missed = banded_.solve(profile_, scaled_, rest_.data(), rest_.data());
+  for (size_t i = 0; i < n; ++i) x[i] += rest_[i];
   return missed;
 }
 

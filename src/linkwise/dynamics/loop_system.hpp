@@ -1,7 +1,8 @@
 #pragma once
 // Lambda f = b of one group of loops, and the metric D in which the least f is taken where many
 // solve it. In coordinates in which D is 1 a small Lambda is factored by pivoting, and a large one
-// in the order of its rows, so that a row of many loops costs what is in its band.
+// in the order of its rows, so that a row of many loops costs what is in its band. The least f is
+// then a second factor, made for loads alone: accelerations are the same for all f.
 #include <array>
 #include <vector>
 
@@ -20,15 +21,16 @@ class LoopSystem {
   double* row(int i) { return profile_.row(Lambda_.data(), i); }
   /// D of a member, lower triangle, packed.
   double* metric(size_t member) { return metric_[member].data(); }
-  /// Pivots below `null` count as zero, in a small system.
-  void factor(double null);
+  /// Pivots below `null` count as zero. least: the least f is asked for.
+  void factor(double null, bool least);
 
-  /// Of a small Lambda; -1 and 1 of a large one, whose null vectors are not counted on the way.
-  int rank() const { return is_small() ? exact_.rank() : -1; }
-  double smallest_pivot() const { return is_small() ? exact_.smallest_pivot() : 1; }
+  int rank() const { return is_small() ? exact_.rank() : banded_.rank(); }
+  double smallest_pivot() const {
+    return is_small() ? exact_.smallest_pivot() : banded_.smallest_pivot();
+  }
   /// How many pivots are larger than `least`.
   int rank_above(double least) const {
-    return is_small() ? exact_.rank_above(least) : shifted_.rank_above(profile_, least);
+    return is_small() ? exact_.rank_above(least) : banded_.rank_above(least);
   }
   /// x <- Lambda^+ x. Returns by how much the constraints contradict each other, where D is 1.
   double solve(std::vector<double>& x);
@@ -41,20 +43,21 @@ class LoopSystem {
   void null_vector(int k, std::vector<double>& f) const;
 
  private:
-  struct Block {
-    int row, n;
-  };
   bool is_small() const { return profile_.size() <= 64; }
   void scale_matrix();
+  double solve_large(double* x);
   void to_scaled(double* x) const;
   void from_scaled(double* x) const;
 
-  std::vector<Block> blocks_;  ///< by member
+  std::vector<RowBlock> blocks_;  ///< by member
   Profile profile_;
   std::vector<double> Lambda_, scaled_, dense_;
   std::vector<std::array<double, 21>> metric_;  ///< D, then its factor
   SemidefiniteFactor exact_;
+  ProfileFactor banded_;
   ShiftedFactor shifted_;
+  bool least_ = false;
+  std::vector<double> rest_, product_;
 };
 
 }  // namespace linkwise

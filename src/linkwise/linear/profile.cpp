@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
+
+#include "linkwise/base/assert.hpp"
 
 namespace linkwise {
 namespace {
@@ -16,6 +19,12 @@ double largest(const std::vector<double>& x) {
   double size = 0;
   for (const double xi : x) size = std::max(size, std::abs(xi));
   return size;
+}
+
+double product_of(const double* a, const double* b, int begin, int end) {
+  double sum = 0;
+  for (int i = begin; i < end; ++i) sum += a[i] * b[i];
+  return sum;
 }
 
 }  // namespace
@@ -38,6 +47,103 @@ void multiply(const Profile& profile, const double* A, const double* x, double* 
   }
 }
 
+void ProfileFactor::factor(const Profile& profile, std::span<const RowBlock> blocks,
+                           const std::vector<double>& A, double null) {
+  rank_ = 0;
+  order_.resize(profile.size());
+  std::iota(order_.begin(), order_.end(), 0);
+  pivot_.assign(profile.size(), 0.0);
+  L_.resize(A.size());
+  for (const RowBlock& block : blocks) factor_block(profile, block, A, null);
+}
+
+/// What the rows before leave of a block is factored by pivoting.
+void ProfileFactor::factor_block(const Profile& profile, RowBlock block,
+                                 const std::vector<double>& A, double null) {
+  const int begin = profile.first(block.row), end = block.row + block.n;
+  const auto row = [&](int i) { return profile.row(L_.data(), i); };
+  for (int i = block.row; i < end; ++i) {
+    LINKWISE_ASSERT(profile.first(i) == begin, "rows of a block start in one column");
+    const double* const given = profile.row(A.data(), i);
+    for (int j = begin; j < block.row; ++j) {
+      const double sum = product_of(row(i), row(j), std::max(begin, profile.first(j)), j);
+      row(i)[j] = pivot_[j] > 0 ? (given[order_[j]] - sum) / row(j)[j] : 0.0;
+    }
+    pivot_[i] = given[i] - product_of(row(i), row(i), begin, block.row);
+  }
+  for (int k = block.row; k < end; ++k) {
+    const int p = static_cast<int>(std::max_element(pivot_.begin() + k, pivot_.begin() + end) -
+                                   pivot_.begin());
+    if (!(pivot_[p] > null)) {
+      for (int i = k; i < end; ++i) {
+        std::fill(row(i) + k, row(i) + i + 1, 0.0);
+        pivot_[i] = 0;
+      }
+      return;
+    }
+    std::swap(order_[k], order_[p]);
+    std::swap(pivot_[k], pivot_[p]);
+    std::swap_ranges(row(k) + begin, row(k) + k, row(p) + begin);
+    row(k)[k] = std::sqrt(pivot_[k]);
+    for (int i = k + 1; i < end; ++i) {
+      const int r = std::max(order_[i], order_[k]), c = std::min(order_[i], order_[k]);
+      const double x = profile.row(A.data(), r)[c] - product_of(row(i), row(k), begin, k);
+      row(i)[k] = x / row(k)[k];
+      pivot_[i] -= row(i)[k] * row(i)[k];
+    }
+    ++rank_;
+  }
+}
+
+int ProfileFactor::rank_above(double least) const {
+  return static_cast<int>(
+      std::count_if(pivot_.begin(), pivot_.end(), [&](double pivot) { return pivot > least; }));
+}
+
+double ProfileFactor::smallest_pivot() const {
+  double least = 0, most = 0;
+  for (const double pivot : pivot_) {
+    if (pivot > 0 && !(least > 0 && least < pivot)) least = pivot;
+    most = std::max(most, pivot);
+  }
+  return most > 0 ? least / most : 1;
+}
+
+void ProfileFactor::solve_once(const Profile& profile, const double* b, double* x) {
+  const int n = profile.size();
+  y_.assign(n, 0.0);
+  for (int i = 0; i < n; ++i) {
+    if (!(pivot_[i] > 0)) continue;
+    const double* row = profile.row(L_.data(), i);
+    y_[i] = (b[order_[i]] - product_of(row, y_.data(), profile.first(i), i)) / row[i];
+  }
+  for (int i = n - 1; i >= 0; --i) {
+    if (!(pivot_[i] > 0)) continue;
+    const double* row = profile.row(L_.data(), i);
+    y_[i] /= row[i];
+    for (int j = profile.first(i); j < i; ++j) y_[j] -= row[j] * y_[i];
+  }
+  for (int i = 0; i < n; ++i) x[order_[i]] = y_[i];
+}
+
+/// Refined once: what rounding leaves of a nearly dependent direction is large.
+double ProfileFactor::solve(const Profile& profile, const std::vector<double>& A, const double* b,
+                            double* x) {
+  const auto n = static_cast<size_t>(profile.size());
+  given_.assign(b, b + n);
+  left_ = given_;
+  more_.resize(n);
+  product_.resize(n);
+  std::fill_n(x, n, 0.0);
+  for (int twice = 0; twice < 2; ++twice) {
+    solve_once(profile, left_.data(), more_.data());
+    for (size_t i = 0; i < n; ++i) x[i] += more_[i];
+    multiply(profile, A.data(), x, product_.data());
+    for (size_t i = 0; i < n; ++i) left_[i] = given_[i] - product_[i];
+  }
+  return largest(left_);
+}
+
 void ShiftedFactor::factor(const Profile& profile, const std::vector<double>& A) {
   L_ = A;
   for (int i = 0; i < profile.size(); ++i) {
@@ -54,15 +160,6 @@ void ShiftedFactor::factor(const Profile& profile, const std::vector<double>& A)
     pivot = std::max(pivot, 0.1 * shift);  // rounding may eat the shift
     row[i] = std::sqrt(pivot);
   }
-}
-
-int ShiftedFactor::rank_above(const Profile& profile, double least) const {
-  int count = 0;
-  for (int i = 0; i < profile.size(); ++i) {
-    const double root = profile.row(L_.data(), i)[i];
-    count += root * root > least;
-  }
-  return count;
 }
 
 void ShiftedFactor::solve_once(const Profile& profile, double* x) const {

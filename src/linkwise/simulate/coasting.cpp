@@ -21,6 +21,7 @@ void Coasting::start(int full) {
 Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, std::vector<double>& dv,
                         bool remember) {
   if (outcome != Outcome::converged && outcome != Outcome::singular_position) return outcome;
+  full_ = std::max(full_, loops.strong);
   const bool inside = loops.strong < full_;
   if (remember) {
     inside_ = inside;

@@ -14,7 +14,7 @@ namespace linkwise {
 
 class Coasting {
  public:
-  /// full: what the loops hold elsewhere, as LoopReport::strong.
+  /// full: what the loops hold elsewhere, as LoopReport::strong; more may be seen on the way.
   void start(int full);
 
   /// Replaces the accelerations dv at time t where the loops are nearly singular, and returns what

@@ -1,4 +1,5 @@
 // What a simulation does for joints that close loops.
+#include <algorithm>
 #include <cmath>
 
 #include "linkwise/base/error.hpp"
@@ -40,6 +41,13 @@ void Simulation::close_loops(const std::vector<std::string>& hold) {
 
 void Simulation::begin_coasting() {
   loops_->find_rank(y_.data());
+  const double* const v = rates_in(y_.data());
+  const bool rests = std::all_of(v, v + nv(), [](double rate) { return rate == 0; });
+  if (rests && loops_->lost_at_start() > 0)
+    throw InputError("simulation of '" + model().spec().name + "'" +
+                     " starts at rest in a singular position, where its loops hold fewer "
+                     "directions than beside it: it may move on in several ways; start it beside "
+                     "that position, or with rates");
   coasting_.start(loops_->full_rank());
 }
 

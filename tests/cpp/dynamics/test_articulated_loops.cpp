@@ -278,7 +278,7 @@ TEST(ArticulatedLoops, RowsOfFourBarsOfAnyLength) {
     const ModelSpec spec = row_of_four_bars(n);
     LoopedMachine machine(spec);
     for (int i = 0; i < machine.tree.nv(); ++i) machine.v[i] = i % 2 == 0 ? 0.7 : -0.7;
-    if (n <= 40) expect_motion(machine, 3, n <= 12 ? 2 * n : -1);  // up to 64 rows are counted
+    if (n <= 40) expect_motion(machine, 3, 2 * n);
     const std::vector<double> tau(machine.tree.nv());
     SweepInput<double> in = machine.input();
     in.tau = tau.data();
@@ -292,6 +292,41 @@ TEST(ArticulatedLoops, RowsOfFourBarsOfAnyLength) {
     const double torque = -spec.gravity.x * ((n + 1) * 0.5 + n);
     for (int i = 0; i < machine.tree.nv(); ++i)
       EXPECT_NEAR(du[i], (i % 2 == 0 ? 1 : -1) * torque / inertia, 1e-10);
+  }
+}
+
+// Each joint and its copy share what they carry: least energy halves it, whatever D is. Groups of
+// more than 64 rows are factored another way than smaller ones.
+TEST(ArticulatedLoops, JointsThatRepeatEachOtherShareTheirLoad) {
+  for (const int copies : {2, 12, 20}) {
+    SCOPED_TRACE(copies);
+    Draws draws(7 + copies);
+    const std::vector<JointType> types(60, JointType::revolute);
+    LoopedMachine machine(tree_spec(types, random_parents(60, draws), draws), draws);
+    for (int l = 0; l < copies; ++l) {
+      machine.close(l % 2 ? JointType::spherical : JointType::universal, 3 * l, 59 - l, draws);
+      machine.close_again();
+    }
+    const int rank = machine.make_consistent();
+    EXPECT_LE(rank, 3 * copies + copies / 2);
+    const DynamicsCase c(machine.tree, 4);
+    SweepInput<double> in = machine.input();
+    in.tau = c.tau.data();
+    std::vector<double> du(machine.model.nv()), loads(6 * machine.model.n_loads());
+    ArticulatedLoops kernel(machine.model);
+    ASSERT_TRUE(kernel.evaluate(in, du.data(), loads.data()));
+    EXPECT_EQ(kernel.report().rank, rank);
+    int rows = 0;
+    for (const LoopGroup& group : kernel.groups()) rows = std::max(rows, group.rows);
+    EXPECT_EQ(rows > 64, copies > 2);
+    const double* const of_loops = &loads[6 * machine.model.n_joints()];
+    double largest = 0;
+    for (int i = 0; i < 12 * copies; ++i) largest = std::max(largest, std::abs(of_loops[i]));
+    EXPECT_GT(largest, 1);
+    for (int l = 0; l < copies; ++l)
+      for (int i = 0; i < 6; ++i)
+        EXPECT_NEAR(of_loops[12 * l + i], of_loops[12 * l + 6 + i], 1e-5 * largest);
+    expect_motion(machine, 4, rank);
   }
 }
 

@@ -61,15 +61,25 @@ TEST(LoopProjection, KnowsWhatLoopsHoldAwayFromSingularPositions) {
     std::vector<double> q = model.neutral_configuration();
     loops.find_rank(q.data());
     EXPECT_EQ(loops.full_rank(), 2 * n);
-    if (n > 3) continue;
     // All rods in one line.
     for (const JointInfo& joint : model.joints)
       q[joint.q] = (joint.name[0] == 'p' ? -1 : 1) * 0.5 * std::acos(-1.0);
     for (const JointInfo& joint : model.joints)
       if (joint.name[0] == 'l') q[joint.q] = 0.5 * std::acos(-1.0);
     EXPECT_LT(loops.gap(q.data()), 1e-12);
+    LoopProjection here(model);
+    std::vector<double> du(model.nv());
+    here.gap(q.data());
+    here.close(q.data(), 1e-12, du.data());
+    EXPECT_EQ(here.report().rank, n);  // each loop holds one direction less
+    EXPECT_EQ(loops.lost_at_start(), 0);
     loops.find_rank(q.data());
+    if (n > 3) {
+      EXPECT_GT(loops.lost_at_start(), 0);
+      continue;
+    }
     EXPECT_EQ(loops.full_rank(), 2 * n);
+    EXPECT_EQ(loops.lost_at_start(), n);
   }
 }
 

@@ -50,6 +50,57 @@ TEST(Profile, MultipliesAsTheDenseMatrix) {
   }
 }
 
+std::vector<RowBlock> blocks_of(int n) {
+  std::vector<RowBlock> blocks;
+  for (int row = 0; row < n; row += 3) blocks.push_back({row, 3});
+  return blocks;
+}
+
+// The rank that pivoting over all rows finds, and a solution, however many null vectors there are.
+TEST(ProfileFactor, LeavesDependentRowsOut) {
+  Draws draws(5);
+  for (const int blocks : {1, 4, 30})
+    for (const int rank : {1, 2, 4}) {
+      const Band band(blocks, rank, draws);
+      SemidefiniteFactor exact;
+      exact.factor(band.n, band.dense.data(), 1e-10);
+      ProfileFactor factor;
+      factor.factor(band.profile, blocks_of(band.n), band.A, 1e-10);
+      EXPECT_EQ(factor.rank(), exact.rank());
+      EXPECT_EQ(factor.rank_above(1e-10), factor.rank());
+      std::vector<double> some(band.n), b(band.n), x(band.n), product(band.n);
+      for (double& s : some) s = draws.normal();
+      multiply(band.profile, band.A.data(), some.data(), b.data());
+      EXPECT_LT(factor.solve(band.profile, band.A, b.data(), x.data()), 1e-12);
+      multiply(band.profile, band.A.data(), x.data(), product.data());
+      int zeros = 0;
+      for (int i = 0; i < band.n; ++i) {
+        EXPECT_NEAR(product[i], b[i], 1e-12);
+        zeros += x[i] == 0;
+      }
+      EXPECT_EQ(zeros, band.n - factor.rank());
+    }
+}
+
+// A block whose first row is nearly null takes another one first.
+TEST(ProfileFactor, TellsWeakDirections) {
+  const Profile profile({0, 0, 0});
+  const double d = 1e-4;  // rows (d, 0), (1, 0), (0, 1e-3)
+  const std::vector<double> A{d * d, d, 1, 0, 0, 1e-6}, b{d, 1, 2e-6};
+  const std::vector<RowBlock> blocks{{0, 3}};
+  ProfileFactor factor;
+  factor.factor(profile, blocks, A, 1e-12);
+  EXPECT_EQ(factor.rank(), 2);
+  EXPECT_EQ(factor.rank_above(1e-5), 1);
+  EXPECT_NEAR(factor.smallest_pivot(), 1e-6, 1e-12);
+  std::vector<double> x(3);
+  EXPECT_LT(factor.solve(profile, A, b.data(), x.data()), 1e-15);
+  EXPECT_NEAR(x[2], 2, 1e-9);
+  factor.factor(profile, blocks, A, 1e-5);
+  EXPECT_NEAR(factor.solve(profile, A, b.data(), x.data()), 2e-6, 1e-12);
+  EXPECT_EQ(x[2], 0);
+}
+
 // The same solution of least length that pivoting finds, however many null vectors there are.
 TEST(ShiftedFactor, GoesToTheLeastLength) {
   Draws draws(3);
