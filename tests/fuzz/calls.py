@@ -207,7 +207,7 @@ def _exchanged(rng, value):
 
 def call(rng, folder):
     """A function, and what it is given."""
-    model = seeds.machine(rng.randrange(5))
+    model = seeds.any_machine(rng)
     wrong = rng.choice((0, 1, 1, 1, 2))
     groups = (_function, _method, _driven, _loads, _scene, _built, _system, _evaluated, _frame)
     group = rng.choice((_function, _function, *groups))
@@ -335,7 +335,7 @@ def _run(number):
 
 def _loads(rng, model, wrong):
     name = rng.choice(sorted(LOADS))
-    run = _run(rng.randrange(3))
+    run = _run(rng.choice((0, 1, 2, 5, 6)))
     given, options = arguments(rng, run.load_model(), LOADS[name], wrong)
     return lambda: getattr(lw.loads, name)(run, *given, **options)
 

@@ -39,6 +39,73 @@ TREE = """<robot name="tree">
   <transmission name="t"><joint name="turn"/></transmission><gazebo reference="hand"/>
 </robot>
 """
+#: A ring: the rocker has two parents, and a gear beside it goes with the crank.
+RING = """<robot name="ring">
+  <link name="base"/>
+  <link name="crank"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+  <link name="bar"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+  <link name="rocker"><inertial><origin xyz="0 0.1 0"/><mass value="1"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+  <link name="gear"><inertial><mass value="1"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+  <joint name="drive" type="continuous"><parent link="base"/><child link="crank"/>
+    <axis xyz="0 0 1"/><dynamics damping="0.1"/></joint>
+  <joint name="knee" type="continuous"><parent link="crank"/><child link="bar"/>
+    <origin xyz="0.2 0 0"/><axis xyz="0 0 1"/></joint>
+  <joint name="pivot" type="continuous"><parent link="base"/><child link="rocker"/>
+    <origin xyz="0.5 -0.2 0"/><axis xyz="0 0 1"/></joint>
+  <joint name="wrist" type="continuous"><parent link="bar"/><child link="rocker"/>
+    <origin xyz="0.4 0 0"/><axis xyz="0 0 1"/><dynamics damping="0.01" friction="0.01"/></joint>
+  <joint name="mesh" type="continuous"><parent link="base"/><child link="gear"/>
+    <origin xyz="0 1 0"/><axis xyz="0 0 1"/><mimic joint="drive" multiplier="-2"/></joint>
+</robot>
+"""
+RING_MJCF = """<mujoco><worldbody>
+  <body name="crank"><joint name="drive" axis="0 0 1"/><geom type="capsule"
+    size=".05" fromto="0 0 0 .2 0 0"/>
+    <body name="bar" pos=".2 0 0"><joint name="knee" axis="0 0 1"/>
+      <geom type="capsule" size=".05" fromto="0 0 0 .4 0 0"/></body></body>
+  <body name="rocker" pos=".5 -.2 0"><joint name="pivot" axis="0 0 1"/><geom size=".1 .1 .1"
+    type="box"/></body>
+  <body name="gear" pos="0 1 0"><joint name="mesh" axis="0 0 1"/><geom size=".1"/></body>
+  <body name="box" pos="1 1 0"><freejoint/><geom size=".1"/></body>
+  </worldbody><equality>
+  <connect body1="bar" body2="rocker" anchor=".4 0 0"/>
+  <weld body1="box" body2="gear" relpose="1 0 0 1 0 0 0"/>
+  <joint joint1="mesh" joint2="drive" polycoef="0 -2 0 0 0"/>
+</equality></mujoco>
+"""
+RING_SCENARIO = """
+model = "ring.urdf"
+mimic = "couple"
+[loop.prop]
+type = "spherical"
+parent = "bar"
+child = "rocker"
+translation = ["400 mm", 0, 0]
+child_translation = [0, 0, 0]
+child_rotation = [0, 0, "10 deg"]
+damping = 0.1
+[rod.link]
+parent = "crank"
+child = "rocker"
+length = "40 cm"
+point = [0.2, 0, 0]
+child_point = [0, 0, 0.0]
+[coupling.pair]
+factors = {mesh = 1, drive = 2.0}
+offset = 0.0
+[drive.drive]
+kind = "torque"
+value = 1
+[simulate]
+duration = 0.02
+integrator = "bdf"
+[output]
+every = 0.01
+"""
 SCENARIO = """
 model = "arm.urdf"
 gravity = [0, 0, "-9.81 m/s2"]
@@ -140,7 +207,7 @@ TABLES = (
     "time;a b\n0;1\n",
 )
 
-URDFS = (ARM, TREE)
+URDFS = (ARM, TREE, RING)
 URDF_WORDS = (
     [*ATTRIBUTES, "robot", "visual", "collision", "geometry", "transmission", "gazebo", "damping"],
     sorted({name for names in ATTRIBUTES.values() for name in names} | {"reference", "filename"}),
@@ -181,25 +248,32 @@ SCENARIO_WORDS = sorted(
 
 @cache
 def mjcfs():
-    return tuple(path.read_text() for path in sorted((DATA / "mjcf").glob("*.xml")))
+    return (*(p.read_text() for p in sorted((DATA / "mjcf").glob("*.xml"))), RING_MJCF, RING_MJCF)
 
 
 @cache
 def scenarios():
-    return tuple(tomllib.loads(text) for text in (SCENARIO, CHAIN_SCENARIO, TREE_SCENARIO))
+    texts = (SCENARIO, CHAIN_SCENARIO, TREE_SCENARIO, RING_SCENARIO)
+    return tuple(tomllib.loads(text) for text in texts)
 
 
 def write_companions(folder):
     """The files that the scenarios name."""
     (folder / "arm.urdf").write_text(ARM)
     (folder / "tree.urdf").write_text(TREE)
+    (folder / "ring.urdf").write_text(RING)
     (folder / "table.csv").write_text(TABLE)
     (folder / "wrench.csv").write_text(WRENCH_TABLE)
 
 
 def machine(number):
-    """One of some small machines of all joint types."""
+    """One of some small machines of all joint types, with loops among them."""
     return _machines()[number % len(_machines())]
+
+
+def any_machine(rng):
+    """One of all of them."""
+    return rng.choice(_machines())
 
 
 @cache
@@ -208,6 +282,7 @@ def _machines():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", lw.ModelWarning)
         tree = lw.load(TREE, floating_base=True, mimic="independent")
+        ring = lw.load(RING, mimic="couple")
     return (
         arm,
         tree,
@@ -215,6 +290,8 @@ def _machines():
         lw.scenes.tree(5, joint="universal"),
         _all_joints(),
         lw.scenes.benchmark("four_bars").model,
+        ring,
+        lw.scenes.chain(2).with_rod("rod", "ground", "link_2", length=1.0, point=(0.5, 0, -1)),
     )
 
 
