@@ -86,15 +86,33 @@ void add_loop(ModelBuilder& builder, std::string name, const std::string& type, 
   builder.add_loop_joint(std::move(loop), type, pitch, properties_from(properties));
 }
 
-void add_rod(ModelBuilder& builder, std::string name, std::string parent, std::string child,
-             double length, nb::handle point, nb::handle child_point) {
+namespace {
+
+LoopJointSpec between(std::string name, std::string parent, std::string child, nb::handle point,
+                      nb::handle child_point) {
   LoopJointSpec loop;
   loop.joint.name = std::move(name);
   loop.joint.parent = std::move(parent);
   loop.joint.child = std::move(child);
   if (!point.is_none()) loop.joint.translation = vec3(point, "point");
   if (!child_point.is_none()) loop.child_translation = vec3(child_point, "child_point");
-  builder.add_rod(std::move(loop), length);
+  return loop;
+}
+
+}  // namespace
+
+void add_rod(ModelBuilder& builder, std::string name, std::string parent, std::string child,
+             double length, nb::handle point, nb::handle child_point) {
+  builder.add_rod(between(std::move(name), std::move(parent), std::move(child), point, child_point),
+                  length);
+}
+
+void add_spring(ModelBuilder& builder, std::string name, std::string parent, std::string child,
+                double length, nb::handle point, nb::handle child_point,
+                const nb::kwargs& properties) {
+  builder.add_spring(
+      between(std::move(name), std::move(parent), std::move(child), point, child_point), length,
+      properties_from(properties));
 }
 
 void add_coupling(ModelBuilder& builder, std::string name, const nb::dict& factors, double offset) {
@@ -192,7 +210,11 @@ Args:
         two frames are one.
 
 Raises:
-    InputError: as add_joint.)")
+    InputError: as add_joint.)");
+}
+
+void bind_what_ties(nb::class_<ModelBuilder>& builder) {
+  builder
       .def("add_rod", &add_rod, "name"_a, "parent"_a, "child"_a, nb::kw_only(), "length"_a,
            "point"_a = nb::none(), "child_point"_a = nb::none(),
            R"(Adds a rod without mass between a ball on each of two links: it keeps the distance of
@@ -206,6 +228,22 @@ Args:
 
 Raises:
     InputError: the length is not more than 0, or an array has another shape.)")
+      .def(
+          "add_spring", &add_spring, "name"_a, "parent"_a, "child"_a, nb::kw_only(), "length"_a,
+          "point"_a = nb::none(), "child_point"_a = nb::none(), "properties"_a,
+          R"(Adds a spring and damper without mass between a ball on each of two links. Its force is along
+the line between the points, and its coordinate is how much their distance is more than its length.
+
+Args:
+    name: unique among joints.
+    parent, child: names of links, or the root link for the ground.
+    length: distance at which it is slack [m], 0 or more.
+    point, child_point: (3,) in the links' frames [m]; None: their origins.
+    properties: those of a prismatic joint as in add_joint, as stiffness [N/m], damping [N s/m],
+        and lower and upper with limit_stiffness for a stop or a rope; they count from the length.
+
+Raises:
+    InputError: the length is negative, a property is unknown, or an array has another shape.)")
       .def("add_coupling", &add_coupling, "name"_a, "factors"_a, nb::kw_only(), "offset"_a = 0.0,
            R"(Ties coordinates of joints together, as gears, racks, screws and differentials do.
 
@@ -232,6 +270,7 @@ void bind_builder(nb::module_& m) {
       "child\n"
       "link's frame coincides with it when the joint is at zero.");
   bind_joints(builder);
+  bind_what_ties(builder);
   builder
       .def(
           "__init__",

@@ -68,6 +68,17 @@ PyModel* with_rod(const PyModel& self, std::string name, std::string parent, std
   return new PyModel(std::move(spec));
 }
 
+PyModel* with_spring(const PyModel& self, std::string name, std::string parent, std::string child,
+                     double length, nb::handle point, nb::handle child_point,
+                     const nb::kwargs& properties) {
+  ModelSpec spec = self.model->spec();
+  ModelBuilder one(spec.name, spec.gravity, spec.source);
+  add_spring(one, std::move(name), std::move(parent), std::move(child), length, point, child_point,
+             properties);
+  spec.loop_joints.push_back(one.spec().loop_joints.front());
+  return new PyModel(std::move(spec));
+}
+
 /// The same machine with one more coupling of its joints.
 PyModel* with_coupling(const PyModel& self, std::string name, const nb::dict& factors,
                        double offset) {
@@ -102,6 +113,16 @@ Args:
 
 Raises:
     InputError: as ModelBuilder.add_rod and build.)")
+      .def("with_spring", &with_spring, "name"_a, "parent"_a, "child"_a, nb::kw_only(), "length"_a,
+           "point"_a = nb::none(), "child_point"_a = nb::none(), "properties"_a,
+           nb::rv_policy::take_ownership,
+           R"(The same machine with a spring and damper without mass between two points.
+
+Args:
+    name, parent, child, length, point, child_point, properties: as in ModelBuilder.add_spring.
+
+Raises:
+    InputError: as ModelBuilder.add_spring and build.)")
       .def("with_coupling", &with_coupling, "name"_a, "factors"_a, nb::kw_only(), "offset"_a = 0.0,
            nb::rv_policy::take_ownership,
            R"(The same machine with coordinates of its joints tied together.
@@ -120,25 +141,29 @@ void bind_loop_joints(ModelClass& c) {
        "loop_types",
        [](const PyModel& s) {
          return list_per_loop(s, [](const LoopJoint& l) {
-           return l.rod_length > 0 ? "rod" : joint_type_name(l.joint.type);
+           return l.kind == LoopKind::rod      ? "rod"
+                  : l.kind == LoopKind::spring ? "spring"
+                                               : joint_type_name(l.joint.type);
          });
        },
-       "Type of each joint that closes a loop, as in ModelBuilder.add_loop, or \"rod\".")
+       "Type of each joint that closes a loop, as in ModelBuilder.add_loop, \"rod\" or \"spring\".")
       .def_prop_ro(
           "loop_nv",
           [](const PyModel& s) {
-            return list_per_loop(
-                s, [](const LoopJoint& l) { return l.rod_length > 0 ? 5 : l.joint.nv; });
+            return list_per_loop(s, [](const LoopJoint& l) {
+              return l.kind == LoopKind::rod ? 5 : l.kind == LoopKind::spring ? 6 : l.joint.nv;
+            });
           },
           "Degrees of freedom that each joint that closes a loop leaves to its two links; it takes "
           "the rest of six.")
       .def_prop_ro(
           "loop_axes",
           [](const PyModel& s) {
-            return list_per_loop(
-                s, [&](const LoopJoint& l) { return axes_of(s.model->spec_of(l.joint)); });
+            return list_per_loop(s, [&](const LoopJoint& l) {
+              return l.kind == LoopKind::joint ? axes_of(s.model->spec_of(l.joint)) : nb::list();
+            });
           },
-          "Axes of each joint that closes a loop, as joint_axes.")
+          "Axes of each joint that closes a loop, as joint_axes; none of rods and springs.")
       .def_prop_ro(
           "loop_parent_link_names",
           [](const PyModel& s) {

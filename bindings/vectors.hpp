@@ -38,6 +38,9 @@ void add_loop(ModelBuilder& builder, std::string name, const std::string& type, 
 
 void add_rod(ModelBuilder& builder, std::string name, std::string parent, std::string child,
              double length, nb::handle point, nb::handle child_point);
+void add_spring(ModelBuilder& builder, std::string name, std::string parent, std::string child,
+                double length, nb::handle point, nb::handle child_point,
+                const nb::kwargs& properties);
 void add_coupling(ModelBuilder& builder, std::string name, const nb::dict& factors, double offset);
 
 }  // namespace linkwise::bindings

@@ -101,6 +101,8 @@ METHODS = {
     "loop_labels": "*loop:index",
     "with_rod": "*name:text *parent:link *child:link *length:number point:vector "
     "child_point:vector",
+    "with_spring": "*name:text *parent:link *child:link *length:number point:vector "
+    "child_point:vector stiffness:number damping:number",
     "with_coupling": "*name:text *factors offset:number",
     "with_loop": "*name:text *type:kind *parent:link *child:link translation:vector rotation "
     "child_translation:vector child_rotation:rotation axis:vector pitch:number",
@@ -255,7 +257,7 @@ def _use(name, result):
 def _method(rng, model, wrong):
     name = rng.choice(sorted(METHODS))
     given, options = arguments(rng, model, METHODS[name], wrong)
-    if name in ("with_payload", "with_rod"):
+    if name in ("with_payload", "with_rod", "with_spring"):
         options["mass" if name == "with_payload" else "length"] = given.pop()
     return lambda: repr(getattr(model, name)(*given, **options))
 

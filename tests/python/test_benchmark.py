@@ -47,6 +47,7 @@ def test_loops_stay_closed_to_first_order(name):
         ("andrews", 7, 3, 0.21023),
         ("bricard", 5, 1, 5.0),
         ("slider_crank", 3, 1, 0.586656),
+        ("flyball_governor", 4, 2, 13.9),
         ("stewart", 13, 5, 148.0),
     ],
 )
@@ -54,6 +55,19 @@ def test_sizes_and_masses(name, joints, loops, mass):
     model = benchmark(name).model
     assert (model.n_joints, model.n_loops) == (joints, loops)
     assert model.total_mass == pytest.approx(mass, rel=1e-9)
+
+
+def test_the_iftomm_numbers_are_names_too():
+    named = ("pendulum", "four_bars", "andrews", "bricard", "flyball_governor")
+    for number, name in enumerate(named, 1):
+        assert benchmark(f"A0{number}").model.hash == benchmark(name).model.hash
+
+
+def test_the_governor_starts_with_slack_springs():
+    """The centre of each arm is half a metre from its pin on the slider."""
+    found = benchmark("flyball_governor")
+    loads = lw.joint_loads(found.model, found.q0, None, passive=True)
+    np.testing.assert_allclose(loads[-2:], 0, atol=1e-9)
 
 
 def test_four_bars_in_any_number():

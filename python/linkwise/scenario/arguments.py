@@ -482,15 +482,16 @@ def with_loops(source: ScenarioSource, model: Model) -> Model:
         except InputError as error:
             problem, _, remedy = str(error).partition("; ")
             source.complain(keys, problem, remedy or "correct it")
-    for name, rod in source.settings.rod.items():
-        keys = ("rod", name)
-        for end in ("parent", "child"):
-            _check_link(source, model, getattr(rod, end), (*keys, end))
-        try:
-            model = model.with_rod(name, **rod.model_dump())
-        except InputError as error:
-            problem, _, remedy = str(error).partition("; ")
-            source.complain(keys, problem, remedy or "correct it")
+    for table, given in (("rod", source.settings.rod), ("spring", source.settings.spring)):
+        for name, section in given.items():
+            for end in ("parent", "child"):
+                _check_link(source, model, getattr(section, end), (table, name, end))
+            values = section.model_dump(exclude_none=True)
+            try:
+                model = getattr(model, f"with_{table}")(name, **values)
+            except InputError as error:
+                problem, _, remedy = str(error).partition("; ")
+                source.complain((table, name), problem, remedy or "correct it")
     for name, coupling in source.settings.coupling.items():
         try:
             model = model.with_coupling(name, coupling.factors, offset=coupling.offset)

@@ -342,6 +342,25 @@ class RodSection(Section):
     child_point: Point | None = None
 
 
+class PointSpringSection(Section):
+    """A spring and damper without mass between a ball on each of two links.
+
+    Limits count from the length.
+    """
+
+    parent: str
+    child: str
+    length: Annotated[float, _of("length"), Field(ge=0)]
+    point: Point | None = None
+    child_point: Point | None = None
+    stiffness: Annotated[float, _of("stiffness")] | None = None
+    damping: Annotated[float, _of("damping")] | None = None
+    lower: Annotated[float, _of("length")] | None = None
+    upper: Annotated[float, _of("length")] | None = None
+    limit_stiffness: Annotated[float, _of("stiffness")] | None = None
+    limit_damping: Annotated[float, _of("damping")] | None = None
+
+
 class CouplingSection(Section):
     """Coordinates tied together: the sum of factor times coordinate is offset, in SI units."""
 
@@ -423,6 +442,7 @@ class ScenarioFile(Section):
     joint: dict[str, JointSection] = {}
     loop: dict[str, LoopSection] = {}
     rod: dict[str, RodSection] = {}
+    spring: dict[str, PointSpringSection] = {}
     coupling: dict[str, CouplingSection] = {}
     rating: dict[str, RatingSection] = {}
     simulate: SimulateSection
@@ -451,6 +471,7 @@ _NAMED: dict[str, type[Section]] = {
     "joint": JointSection,
     "loop": LoopSection,
     "rod": RodSection,
+    "spring": PointSpringSection,
     "coupling": CouplingSection,
     "rating": RatingSection,
 }

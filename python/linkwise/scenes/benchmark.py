@@ -46,15 +46,20 @@ def benchmark(name: str, *, n: int = 2) -> Benchmark:
         bodies and a spring [hairer1996];
         "bricard" (A04): Bricard's six hinges, whose axes let five rods move although counting says
         that they cannot;
+        "flyball_governor" (A05): Watt's governor, whose slider hangs on two stiff springs and
+        dampers; its shaft starts at 2 pi rad/s;
         "slider_crank": the rigid slider-crank of [simeon1996], its crank at 150 rad/s;
         "stewart": a platform of 100 kg on six legs, each universal, prismatic and spherical.
     n: linkages of "four_bars".
+
+    "A01" to "A05" are names of the same machines.
 
     A planar machine moves in x, y. Every joint that closes a loop is closed where it starts.
     Raises InputError for another name or n, MemoryError where there is no room for n.
     """
     check_count("n", n)
     check_bodies(2 * n + 1)
+    name = _NUMBERED.get(name, name)
     if name not in _MAKERS:
         raise InputError(f"benchmark {name!r:.60} is unknown; known: {', '.join(_MAKERS)}")
     return four_bars(n) if name == "four_bars" else _MAKERS[name]()
@@ -183,6 +188,41 @@ def bricard() -> Benchmark:
     return _at_rest(builder.build())
 
 
+def flyball_governor() -> Benchmark:
+    """Drawn where it starts, the shaft along z; bars of a square section of 1 cm, 3,000 kg/m3."""
+    builder = ModelBuilder("flyball_governor")
+    builder.add_link("ground")
+    bar, ball, length, width = 0.3, 5.0, 1.0, 0.01
+    builder.add_link("shaft", mass=bar, com=(0, 0, 0.5), inertia=_thin(2, bar, length, width))
+    builder.add_joint("bearing", "revolute", "ground", "shaft", axis=_Z)
+    builder.add_link("slider", mass=3.0, inertia=np.eye(3) * 3.0 * 0.1**2 / 6)
+    builder.add_joint("guide", "prismatic", "shaft", "slider", translation=(0, 0, 0.5), axis=_Z)
+    sunk = np.deg2rad(30)
+    for name, side in (("right", 1.0), ("left", -1.0)):
+        along = np.array([side * np.cos(sunk), 0, -np.sin(sunk)])
+        across = np.eye(3) - np.outer(along, along)
+        center = (bar * length / 2 + ball * length) / (bar + ball)
+        moments = bar * (length**2 + width**2) / 12 * across
+        moments += bar * width**2 / 6 * np.outer(along, along)
+        moments += (bar * (center - length / 2) ** 2 + ball * (center - length) ** 2) * across
+        arm, hinge = f"{name}_arm", (side * 0.05, 0, 1.0)
+        builder.add_link(arm, mass=bar + ball, com=center * along, inertia=moments)
+        builder.add_joint(
+            f"{name}_hinge", "revolute", "shaft", arm, translation=hinge, axis=(0, 1, 0)
+        )
+        builder.add_spring(
+            f"{name}_spring",
+            "slider",
+            arm,
+            length=0.5,
+            point=(side * 0.05, 0, 0),
+            child_point=length / 2 * along,
+            stiffness=8e5,
+            damping=4e4,
+        )
+    return _moving(builder.build(), {}, {"bearing": 2 * np.pi})
+
+
 def slider_crank() -> Benchmark:
     """Stretched out along x; without gravity, as published."""
     crank, rod = 0.15, 0.30
@@ -282,6 +322,9 @@ _MAKERS: dict[str, Callable[..., Benchmark]] = {
     "four_bars": four_bars,
     "andrews": andrews,
     "bricard": bricard,
+    "flyball_governor": flyball_governor,
     "slider_crank": slider_crank,
     "stewart": stewart,
 }
+#: What the IFToMM benchmarks call them.
+_NUMBERED = dict(zip(("A01", "A02", "A03", "A04", "A05"), tuple(_MAKERS)[:5], strict=True))

@@ -105,7 +105,7 @@ std::vector<LoopGroup::Member> all_members(const Model& model) {
 }  // namespace
 
 int loop_rows(const Model& model, const LoopJoint& loop) {
-  if (loop.rod_length > 0) return 1;
+  if (loop.kind != LoopKind::joint) return loop.kind == LoopKind::rod ? 1 : 0;
   int rows = 6;
   for (const Element& e : stack_of(model, loop))
     if (!e.prescribed) rows -= e.nv;

@@ -98,8 +98,8 @@ void LoopStates::update_loop(bool moving, int l) {
                        of_b = loop.on_child * velocity_of(loop.joint.body);
   out.speed = std::max(size(of_a.lin) + out.length * size(of_a.ang),
                        size(of_b.lin) + out.length * size(of_b.ang));
-  if (loop.rod_length > 0)
-    update_rod(l, X_FE, of_b);
+  if (loop.kind != LoopKind::joint)
+    update_distance(l, X_FE, of_b);
   else
     update_joint(moving, l, X_FE, of_a, of_b);
 }
@@ -136,21 +136,32 @@ void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
   }
 }
 
-/// Of two points at a constant distance: the acceleration along n is -|v across n|^2 / distance.
-/// That of a point is the componentwise one and w x v.
-void LoopStates::update_rod(int l, const Transform<double>& X_FE, const Motion<double>& of_b) {
+/// A rod keeps the distance of two points: their acceleration along n is -|v across n|^2 /
+/// distance. That of a point is the componentwise one and w x v. A spring holds nothing. Its force
+/// is along n, which is any direction where the points meet: there a spring of length 0 has no
+/// force.
+void LoopStates::update_distance(int l, const Transform<double>& X_FE, const Motion<double>& of_b) {
   const LoopJoint& loop = model_.loops.joints[l];
   LoopState& out = loops_[l];
   const double distance = size(X_FE.r);
-  const Vec3<double> n = (1 / distance) * (X_FE.R * X_FE.r);
+  const Vec3<double> n =
+      distance > 0 ? (1 / distance) * (X_FE.R * X_FE.r) : Vec3<double>{1.0, 0.0, 0.0};
   const Motion<double> of_E = loop.on_parent * velocity_of(loop.parent_body);
   const Vec3<double> relative = of_b.lin - X_FE.R * of_E.lin;
   const Vec3<double> across = relative - dot(n, relative) * n;
   const Vec3<double> turned = cross(of_b.ang, of_b.lin) - X_FE.R * cross(of_E.ang, of_E.lin);
-  out.basis.n = 0;
-  out.rows = 1;
+  const bool spring = loop.kind == LoopKind::spring;
+  out.basis.n = spring ? 1 : 0;
+  out.rows = spring ? 0 : 1;
+  if (spring) {
+    out.basis.dual[0] = {n.x, n.y, n.z, 0, 0, 0};
+    out.dof[0] = loop.joint.v;
+    q_[loop.joint.q] = distance - loop.length;
+    v_[loop.joint.v] = dot(n, relative);
+    return;
+  }
   out.basis.Q[0] = {n.x, n.y, n.z, 0, 0, 0};
-  out.gap[0] = distance - loop.rod_length;
+  out.gap[0] = distance - loop.length;
   out.slip[0] = dot(n, relative);
   out.r[0] = -dot(across, across) / distance - dot(n, turned);
 }

@@ -6,7 +6,7 @@
 //     r = G_a a_a + G_b a_b,      r = Q^T c
 // with P, Q and c of the same stack of elements that a tree joint would have (joints/closure.hpp).
 // What is left of the pose is the gap, which is closed in a state that is consistent. A rod has no
-// P, and Q is the one direction n from E to F.
+// P, and Q is the one direction n from E to F. A spring has no Q, and P^+T is n.
 #include <span>
 #include <string>
 #include <vector>
@@ -57,10 +57,10 @@ class LoopStates {
 
  private:
   void update_loop(bool moving, int l);
-  /// The same of a joint and of a rod. of_a, of_b: velocities of both bodies at F.
+  /// The same of a joint, and of a rod or a spring. of_a, of_b: velocities of both bodies at F.
   void update_joint(bool moving, int l, const Transform<double>& X_FE, const Motion<double>& of_a,
                     const Motion<double>& of_b);
-  void update_rod(int l, const Transform<double>& X_FE, const Motion<double>& of_b);
+  void update_distance(int l, const Transform<double>& X_FE, const Motion<double>& of_b);
   Motion<double> velocity_of(int body) const {
     return body >= 0 ? bodies_[body].v : Motion<double>{};
   }

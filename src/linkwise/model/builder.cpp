@@ -140,7 +140,15 @@ void ModelBuilder::add_rod(LoopJointSpec loop, double length) {
     throw InputError("rod '" + loop.joint.name + "'" + source_of(spec_) + ": length is " +
                      number_text(length) + "; give the length of the rod in m, more than 0");
   loop.joint.type = JointType::fixed;
-  loop.rod_length = length;
+  loop.kind = LoopKind::rod;
+  loop.length = length;
+  spec_.loop_joints.push_back(std::move(loop));
+}
+
+void ModelBuilder::add_spring(LoopJointSpec loop, double length, Properties properties) {
+  complete(loop.joint, "prismatic", 0, std::move(properties));
+  loop.kind = LoopKind::spring;
+  loop.length = length;
   spec_.loop_joints.push_back(std::move(loop));
 }
 

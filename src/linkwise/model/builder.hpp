@@ -41,6 +41,9 @@ class ModelBuilder {
   /// A rod of this length [m] without mass between the points of `loop`; 0 and less throw
   /// InputError.
   void add_rod(LoopJointSpec loop, double length);
+  /// A spring and damper between the points of `loop`, without mass, slack at this length [m]; its
+  /// properties are those of a prismatic joint.
+  void add_spring(LoopJointSpec loop, double length, Properties properties);
   void add_coupling(CouplingSpec coupling) { spec_.couplings.push_back(std::move(coupling)); }
 
   /// level: "merge", "warning" or "info".

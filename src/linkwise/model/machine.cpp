@@ -138,9 +138,13 @@ Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::s
       throw InputError("joint '" + j.name + "'" + where + ": link '" + j.child +
                        "' is its parent and its child; give it two links");
     const bool closes = i >= static_cast<int>(spec.joints.size());
-    const bool is_rod = closes && spec.loop_joints[i - spec.joints.size()].rod_length > 0;
-    graph.joints.push_back({parent, child, is_rod ? 5 : joint_dof(j), acts(j),
-                            !closes && j.type == JointType::fixed, closes});
+    int dof = joint_dof(j);
+    if (closes) {
+      const LoopKind kind = spec.loop_joints[i - spec.joints.size()].kind;
+      dof = kind == LoopKind::spring ? 6 : kind == LoopKind::rod ? 5 : dof;
+    }
+    graph.joints.push_back(
+        {parent, child, dof, acts(j), !closes && j.type == JointType::fixed, closes});
   }
   if (spec.keep_fixed) {
     const std::vector<char> carries = links_that_carry(graph);
@@ -150,6 +154,10 @@ Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::s
   for (const std::string& name : spec.prescribed) {
     const int j = names.find(
         name, [&](int k) -> const auto& { return machine.joint(k).name; });
+    if (const int loop = j - static_cast<int>(spec.joints.size());
+        loop >= 0 && spec.loop_joints[loop].kind != LoopKind::joint)
+      throw InputError("joint '" + name + "'" + where +
+                       " is a rod or a spring, whose motion cannot be given; give that of a joint");
     if (j >= 0) graph.joints[j].acts = true;
     if (j >= 0 || (spec.floating_base && name == spec.floating_joint))
       machine.prescribed[j >= 0 ? j : n_joints] = 1;

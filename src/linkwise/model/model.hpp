@@ -91,7 +91,8 @@ struct LoopJoint {
   int parent_link = 0;
   Transform<double> on_parent;  ///< parent's body frame -> E, the joint's axes as given
   Transform<double> on_child;   ///< child's body frame -> F, which is the last element's frame
-  double rod_length = 0;        ///< of a rod between the origins of E and F, m; 0: a joint
+  LoopKind kind = LoopKind::joint;
+  double length = 0;  ///< of a rod or a spring between the origins of E and F, m
 };
 
 /// All of them. Their coordinates, rates and properties are counted apart from the tree's.

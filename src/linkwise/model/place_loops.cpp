@@ -65,7 +65,8 @@ LoopJoints place_loops(const Machine& machine, const SpanningForest& forest,
     if (j >= first_given) {
       const LoopJointSpec& given = machine.spec.loop_joints[j - first_given];
       on_child = {transpose(given.child_rotation), given.child_translation};
-      loop.rod_length = given.rod_length;
+      loop.kind = given.kind;
+      loop.length = given.length;
     }
     loop.on_child = to_last * on_child * child.from_body;
     out.joints.push_back(std::move(loop));

@@ -149,7 +149,8 @@ void spec_fields(A& archive, Spec& spec) {
     archive.raw(loop.joint.initial.data(), loop.joint.initial.size() * sizeof(double));
     archive.raw(loop.child_rotation.m, sizeof(loop.child_rotation.m));
     archive.raw(&loop.child_translation.x, 3 * sizeof(double));
-    archive.raw(&loop.rod_length, sizeof(double));
+    archive.choice(loop.kind, n_loop_kinds);
+    archive.raw(&loop.length, sizeof(double));
   }
   archive.size(spec.couplings);
   for (auto& coupling : spec.couplings) {

@@ -108,16 +108,21 @@ struct JointSpec {
   std::vector<double> initial;  ///< coordinates where it starts; empty: the zero position
 };
 
+/// What stands between two links of a loop: a joint, or one of two things without mass between two
+/// points. A rod holds their distance. A spring holds nothing; its coordinate is how much their
+/// distance is more than its length.
+enum class LoopKind : unsigned char { joint, rod, spring };
+inline constexpr int n_loop_kinds = 3;
+
 /// A joint that closes a loop, whatever else its links hang on: its point and axes are given on
 /// both links. `joint` places them on the parent.
 struct LoopJointSpec {
   JointSpec joint;
   Mat3<double> child_rotation =
-      Mat3<double>::identity();    ///< joint axes in the child link frame (columns)
-  Vec3<double> child_translation;  ///< joint point in the child link frame, m
-  /// Of a rod without mass between two balls, m: all that it holds is the distance of the two
-  /// points. 0: a joint. A rod's joint is of type fixed, which has no coordinates.
-  double rod_length = 0;
+      Mat3<double>::identity();     ///< joint axes in the child link frame (columns)
+  Vec3<double> child_translation;   ///< joint point in the child link frame, m
+  LoopKind kind = LoopKind::joint;  ///< the type of a rod's joint is fixed, of a spring's prismatic
+  double length = 0;                ///< of a rod or a spring, m
 };
 
 /// Coordinates of joints with one degree of freedom that go together, as gears, racks and

@@ -119,9 +119,15 @@ void validate(ModelSpec& spec, std::vector<Note>& notes) {
     if (!finite(loop.child_translation))
       throw InputError(head + "child_translation is not finite; give three finite numbers in m");
     require_rotation(loop.child_rotation, head + "child_rotation");
-    if (!std::isfinite(loop.rod_length) || loop.rod_length < 0)
-      throw InputError(head + "length is " + number_text(loop.rod_length) +
-                       "; give the length of the rod in m, more than 0");
+    const bool rod = loop.kind == LoopKind::rod;
+    if (!std::isfinite(loop.length) || loop.length < 0 || (rod && loop.length == 0))
+      throw InputError(head + "length is " + number_text(loop.length) +
+                       "; give the length of the " +
+                       (rod ? "rod in m, more than 0" : "spring in m, 0 or more"));
+    if (loop.kind != LoopKind::spring) continue;
+    for (const DofValue& given : loop.joint.dof)
+      if (given.property == DofProperty::armature)
+        throw InputError(head + "a spring has no armature; give it to a joint");
   }
 }
 

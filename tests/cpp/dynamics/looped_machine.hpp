@@ -144,7 +144,8 @@ struct LoopedMachine {
       return body < 0 ? X.r : (X * poses[body]).r;
     };
     const Vec3<double> r = point(b, loop.on_child) - point(a, loop.on_parent);
-    loop.rod_length = std::sqrt(dot(r, r));
+    loop.kind = LoopKind::rod;
+    loop.length = std::sqrt(dot(r, r));
   }
   /// The last loop joint once more: a copy of it holds what it holds already.
   void close_again() {

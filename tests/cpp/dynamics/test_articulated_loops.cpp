@@ -90,7 +90,7 @@ double violation(const LoopedMachine& machine, const LoopStates& states, int l,
                  const std::vector<double>& du) {
   const LoopJoint& loop = machine.model.loops.joints[l];
   const auto motions = WorldTwin(machine.tree).moved(machine.q, machine.v, du);
-  if (loop.rod_length > 0)
+  if (loop.kind == LoopKind::rod)
     return std::abs(parting(machine, loop, motions).imag() / WorldTwin::step);
   const auto moving = relative_motion(machine, loop, motions);
   const std::span<const Element> stack = stack_of(machine.model, loop);
