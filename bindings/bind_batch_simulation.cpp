@@ -42,18 +42,22 @@ nb::tuple simulate_members(nb::list simulations, nb::handle q0, nb::handle v0, n
   const Executor executor = executor_for(whole_number(threads, "threads"));
   Interrupt interrupt;
   std::vector<Ending> endings;
-  ForcesOfMembers doubt;
+  MemberNotes notes;
   {
     const GilReleased released;
     endings = simulate_batch(
         all, start, {times.data, n}, columns.sample, executor,
-        [&interrupt] { return !interrupt(); }, keep ? extremes.data : nullptr, &doubt);
+        [&interrupt] { return !interrupt(); }, keep ? extremes.data : nullptr, &notes);
   }
   const bool interrupted = interrupt.was_keyboard();
   nb::list ends;
   for (Ending& ending : endings) ends.append(nb::cast(std::move(ending)));
+  nb::list loops;
+  for (const LoopNotes& note : notes.loops)
+    loops.append(nb::make_tuple(note.assembled, note.doubt));
+  const ForcesOfMembers& forces = notes.forces;
   return nb::make_tuple(columns.to_python(members), extremes.array, ends, interrupted,
-                        nb::make_tuple(doubt.members, doubt.worst, doubt.text));
+                        nb::make_tuple(forces.members, forces.worst, forces.text), loops);
 }
 
 }  // namespace
@@ -66,7 +70,9 @@ void bind_batch_simulation(nb::module_& m) {
         "(arrays by name, extremes (member, ...) where the simulations keep them, endings, "
         "interrupted by Ctrl-C,\n"
         "(members whose forces of large gain are not known well, the worst one, what is said of "
-        "it)).");
+        "it),\n"
+        "of each member what closing its loops moved at the start, and where their loads have no "
+        "bound).");
 }
 
 }  // namespace linkwise::bindings

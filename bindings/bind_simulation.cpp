@@ -203,8 +203,10 @@ void bind_simulation(nb::module_& m) {
           "noticed.")
       .def_prop_ro(
           "force_doubt", [](const PySimulation& s) { return s.simulation.force_doubt(); },
-          "Where gains make too much force of the errors of steps, one line; empty where they do "
-          "not.")
+          "Where gains make too much force of the errors of steps, one line; empty: nowhere.")
+      .def_prop_ro(
+          "loop_doubt", [](const PySimulation& s) { return s.simulation.loop_doubt(); },
+          "Where loads of closed loops have no bound, one line; empty: nowhere.")
       .def(
           "keep_trace",
           [](PySimulation& s, bool wanted) {

@@ -209,7 +209,7 @@ void PySimulation::wrench_callable(nb::handle at, nb::callable fn, const std::st
 }
 
 void PySimulation::keep_extremes(nb::handle directions) {
-  const size_t n = static_cast<size_t>(model->n_joints());
+  const size_t n = static_cast<size_t>(model->n_loads());
   const ArrayIn rows = as_array(directions, "directions");
   if (rows.ndim() != 2 || rows.shape(0) != n || rows.shape(1) != 3)
     throw InputError("directions has shape " + shape_text(shape_of(rows)) + "; give shape (" +

@@ -95,7 +95,8 @@ RETURNS = {
     "methods": "list[dict[str, Any]]",
     "numerics": "list[dict[str, Any]]",
     "quantities": "list[dict[str, Any]]",
-    "simulate_members": "tuple[dict[str, Any], Array, list[Ending], bool, tuple[int, int, str]]",
+    "simulate_members": "tuple[dict[str, Any], Array, list[Ending], bool, tuple[int, int, str], "
+    "list[tuple[str, str]]]",
     "solver_options": "list[dict[str, Any]]",
     "solvers": "list[dict[str, Any]]",
     "stop_rules": "list[dict[str, str]]",

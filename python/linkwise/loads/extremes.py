@@ -131,7 +131,7 @@ def states_at_peaks(run: RunLike, model: Model) -> State | None:
         return None
     held = _rows(run, "state", len(HALVES))
     parts = np.cumsum([model.nq, model.nv, model.nv, model.nv])
-    if held.shape[1:] != (model.n_joints, parts[-1]):
+    if held.shape[1:] != (model.n_joints + model.n_loops, parts[-1]):
         raise _damaged(run, "state")
     return State(*np.split(held, parts[:-1], axis=-1))
 

@@ -37,12 +37,17 @@ class Part:
 
 def _flat_size(model: Model) -> int:
     """Numbers per row: derived quantities and components of loads, coordinates, rates."""
-    return (len(DERIVED) + len(COMPONENTS)) * model.n_joints + model.nq + 3 * model.nv
+    return (len(DERIVED) + len(COMPONENTS)) * _loaded(model) + model.nq + 3 * model.nv
+
+
+def _loaded(model: Model) -> int:
+    """Joints that carry loads: those of the tree, then those that close loops."""
+    return model.n_joints + model.n_loops
 
 
 def _places(model: Model) -> dict[str, int]:
-    load = len(DERIVED) * model.n_joints
-    position = load + len(COMPONENTS) * model.n_joints
+    load = len(DERIVED) * _loaded(model)
+    position = load + len(COMPONENTS) * _loaded(model)
     first = position + model.nq
     names = ("velocity", "acceleration", "drive_torque")
     rates = {name: first + k * model.nv for k, name in enumerate(names)}
@@ -113,7 +118,7 @@ def extremes_layout(model: Model, variables: Sequence[Variable]) -> ExtremesLayo
         attrs = {**kept, "long_name": about, **units}
         return replace(like, name=PREFIX + name, dims=tuple(dims), shape=tuple(shape), attrs=attrs)
 
-    n, whole = len(ROWS), model.n_joints
+    n, whole = len(ROWS), _loaded(model)
     of_quantities = variable(
         "quantity", ("extreme", "quantity", "joint"), (n, len(DERIVED), joints), load
     )

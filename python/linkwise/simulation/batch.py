@@ -18,6 +18,7 @@ from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
 from linkwise.simulation.arguments import check_steps, number, optional_count, sample_times
+from linkwise.simulation.determinacy import undetermined_loads
 from linkwise.simulation.recording import Recording
 from linkwise.simulation.simulate import (
     SimulationInterrupted,
@@ -126,6 +127,29 @@ def _forces_in_doubt(members: int, worst: int, text: str, count: int) -> list[Ig
     return [Ignored("", "forces", said)]
 
 
+def _of_loops(
+    models: Sequence[Model],
+    rows: Mapping[str, Array],
+    said: Sequence[tuple[str, str]],
+    schema: Schema,
+) -> list[Ignored]:
+    """What was moved to close the loops of members, and which of their loads are not known."""
+    notes = []
+    for element, texts in zip(("assembly", "joint_load"), zip(*said, strict=True), strict=True):
+        of = [member for member, text in enumerate(texts) if text]
+        if of:
+            more = f"; the like of {len(of) - 1} more members" if len(of) > 1 else ""
+            notes.append(Ignored("", element, f"member {of[0]}: {texts[of[0]]}{more}"))
+    if "joint_load" not in schema.quantities:
+        return notes
+    each = len(rows["q0"]) // len(models)
+    for k, model in enumerate(models):
+        for note in undetermined_loads(model, rows["q0"][k * each], rows["v0"][k * each]):
+            if note not in notes:
+                notes.append(note)
+    return notes
+
+
 def simulate_batch(
     model: Model | Sequence[Model],
     *,
@@ -182,7 +206,7 @@ def simulate_batch(
     models = _machines(model)
     first = models[0]
     sampled = sample_times(duration, every, times)
-    keep = Recording(extremes=extremes).keeps_extremes(first.n_joints) and not first.n_loops
+    keep = Recording(extremes=extremes).keeps_extremes(first.n_joints)
     schema = build_schema(first, QUANTITIES if record is None else record, extremes=keep)
     unknown = [name for name in schema.quantities if name not in QUANTITIES]
     if unknown:
@@ -215,7 +239,7 @@ def simulate_batch(
     )
     ignored = warnings_of(*models)
     tell(ignored, reading=False)
-    columns, flat, endings, interrupted, doubt = _core.simulate_members(
+    columns, flat, endings, interrupted, doubt, said = _core.simulate_members(
         simulations,
         q0=rows["q0"],
         v0=rows["v0"],
@@ -227,6 +251,8 @@ def simulate_batch(
     if schema.extremes:
         columns |= schema.extremes.split(flat)
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
+    if not interrupted:
+        ignored = [*ignored, *_of_loops(models, rows, said, schema)]
     early = sum(ending.outcome != "converged" for ending in endings)
     attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)
     noticed = _forces_in_doubt(*doubt, count)

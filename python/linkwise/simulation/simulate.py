@@ -228,8 +228,12 @@ def _record(
 
 
 def _noticed(simulation: Simulation, ignored: Sequence[Ignored]) -> list[Ignored]:
-    """What was noticed about stiffness and about forces of large gain, for the run's warnings."""
-    said = {"integrator": simulation.stiffness, "forces": simulation.force_doubt}
+    """What was noticed about stiffness, forces of large gain, singular positions: the warnings."""
+    said = {
+        "integrator": simulation.stiffness,
+        "forces": simulation.force_doubt,
+        "joint_load": simulation.loop_doubt,
+    }
     if any(note.element == COARSE for note in ignored):
         said.pop("integrator")  # short steps have another reason
     return [Ignored("", element, text) for element, text in said.items() if text]
@@ -406,7 +410,7 @@ def simulate(
         recording.quantities,
         recording.joints,
         wrenched_bodies(model, by_name),
-        extremes=recording.keeps_extremes(model.n_joints) and not model.n_loops,
+        extremes=recording.keeps_extremes(model.n_joints),
     )
     if on_failure not in ("raise", "return"):
         raise InputError(f'on_failure: {shown(on_failure)} is unknown; use "raise" or "return"')

@@ -1,6 +1,8 @@
 #include "linkwise/simulate/coasting.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace linkwise {
 namespace {
@@ -16,6 +18,8 @@ void Coasting::start(int full) {
   inside_ = remembered_ = false;
   steps_inside_ = 0;
   known_.clear();
+  pivots_.clear();
+  passed_ = std::numeric_limits<double>::quiet_NaN();
 }
 
 Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, std::vector<double>& dv,
@@ -27,6 +31,7 @@ Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, std:
     inside_ = inside;
     remembered_ = !inside && outcome == Outcome::converged;
     if (remembered_) last_ = {t, dv};
+    last_pivot_ = {t, inside ? 0 : loops.smallest_pivot};
   }
   if (!inside || known_.size() < fewest_points) return outcome;
   if (steps_inside_ > most_steps_inside) return Outcome::singular_position;
@@ -36,9 +41,29 @@ Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, std:
 
 void Coasting::accepted() {
   steps_inside_ = inside_ ? steps_inside_ + 1 : 0;
+  find_passage();
   if (!remembered_ || (!known_.empty() && !(last_.t > known_.back().t))) return;
   known_.push_back(last_);
   if (known_.size() > points) known_.pop_front();
+}
+
+/// Where the parabola through the last three pivots comes down to less than a twentieth of the
+/// least.
+void Coasting::find_passage() {
+  if (!pivots_.empty() && !(last_pivot_.t > pivots_.back().t)) return;
+  pivots_.push_back(last_pivot_);
+  if (pivots_.size() > 3) pivots_.pop_front();
+  if (!std::isnan(passed_)) return;
+  if (inside_) passed_ = last_pivot_.t;
+  if (pivots_.size() < 3) return;
+  const Pivot &a = pivots_[0], &b = pivots_[1], &c = pivots_[2];
+  const double first = (b.value - a.value) / (b.t - a.t),
+               second = (c.value - b.value) / (c.t - b.t), bend = (second - first) / (c.t - a.t);
+  if (!(bend > 0)) return;
+  const double lowest = (a.t + b.t - first / bend) / 2;
+  if (lowest < a.t || lowest > c.t) return;
+  const double value = a.value + (lowest - a.t) * (first + bend * (lowest - b.t));
+  if (value < 0.05 * std::min({a.value, b.value, c.value})) passed_ = lowest;
 }
 
 /// By Lagrange's polynomial.

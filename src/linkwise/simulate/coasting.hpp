@@ -24,19 +24,31 @@ class Coasting {
   /// The step that the last evaluation belongs to is accepted.
   void accepted();
 
+  /// When the first singular position was passed, roughly; NaN: none was. Steps may jump over one:
+  /// pivots, which go to zero there as a parabola does, tell it.
+  double passed() const { return passed_; }
+
  private:
   struct Known {
     double t;
     std::vector<double> dv;
   };
 
+  struct Pivot {
+    double t, value;
+  };
+
   void extrapolate(double t, std::vector<double>& dv) const;
+  void find_passage();
 
   int full_ = 0;
   bool inside_ = false, remembered_ = false;
   int steps_inside_ = 0;
   Known last_;
   std::deque<Known> known_;
+  Pivot last_pivot_{};
+  std::deque<Pivot> pivots_;  ///< of the last accepted states
+  double passed_ = 0;
 };
 
 }  // namespace linkwise

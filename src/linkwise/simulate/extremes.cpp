@@ -167,12 +167,14 @@ size_t Extremes::append_middle(size_t left, size_t right) {
     v[i] = cubic(row(points_.v, left, nv)[i], row(points_.v, right, nv)[i],
                  row(points_.a, left, nv)[i], row(points_.a, right, nv)[i]);
   normalise_quaternions(*model_, q.data());
+  if (evaluation_.close) evaluation_.close(points_.t[left] + h / 2, q.data(), v.data());
   return append(points_.t[left] + h / 2, q.data(), v.data());
 }
 
 /// Evaluates rows; those that have no accelerations keep values that are not a number.
 void Extremes::evaluate(std::span<const size_t> rows) {
   if (rows.empty()) return;
+  if (evaluation_.evaluate) return evaluate_each(rows);
   const size_t n = rows.size(), nq = model_->nq(), nv = model_->nv(), n_load = 6 * joints(*model_);
   const bool outside = !setup_->wrenches.empty(), given = setup_->any_given();
   const size_t systems = filled(n);
@@ -217,6 +219,21 @@ void Extremes::evaluate(std::span<const size_t> rows) {
   }
 }
 
+void Extremes::evaluate_each(std::span<const size_t> rows) {
+  const size_t nq = model_->nq(), nv = model_->nv(), n_load = 6 * joints(*model_);
+  Systems& s = systems_;
+  s.resize(1, nq, nv, n_load);
+  for (const size_t at : rows) {
+    double* du = row(points_.a, at, nv);
+    if (!evaluation_.evaluate(points_.t[at], row(points_.q, at, nq), row(points_.v, at, nv), du,
+                              s.loads.data(), s.drive.data())) {
+      std::fill_n(du, nv, nan);
+      std::fill(s.loads.begin(), s.loads.end(), nan);
+    }
+    write_values(at, s.loads.data(), s.drive.data());
+  }
+}
+
 void Extremes::Systems::resize(size_t n, size_t nq, size_t nv, size_t n_load) {
   q.resize(n * nq);
   for (auto* rates : {&v, &tau, &drive, &du, &total}) rates->resize(n * nv);
@@ -240,9 +257,11 @@ void Extremes::write_values(size_t at, const double* loads, const double* drive)
     const auto derived = [&](Derived d) { return out + d * nj + j; };
     resolve(load, axis, derived(force), derived(axial), derived(radial));
     resolve(load + 3, axis, derived(moment), derived(torque), derived(tilting_moment));
-    const JointInfo& info = model_->joints[j];
     double power = 0;
-    for (int i = info.v; i < info.v + info.nv; ++i) power += drive[i] * v[i];
+    if (j < static_cast<size_t>(model_->n_joints())) {
+      const JointInfo& info = model_->joints[j];
+      for (int i = info.v; i < info.v + info.nv; ++i) power += drive[i] * v[i];
+    }
     *derived(drive_power) = power;
   }
   out = std::copy_n(loads, 6 * nj, out + n_derived * nj);
@@ -481,6 +500,12 @@ void Extremes::forget() {
   points_.a.resize(kept * nv);
   judged_ -= first;
   seen_ = kept;
+}
+
+void Extremes::leave_loads_open() {
+  const size_t loads = (n_derived + 6) * joints(*model_);
+  std::fill_n(least_.reach.begin(), loads, -infinity);
+  std::fill_n(largest_.reach.begin(), loads, infinity);
 }
 
 void Extremes::trim() { points_.values.resize(points_.t.size() * width_); }

@@ -1,7 +1,9 @@
 #pragma once
 // The extremes of what a simulation records, between its samples too.
+#include <functional>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "linkwise/dynamics/batch.hpp"
@@ -15,16 +17,32 @@ namespace linkwise {
 /// The end of every step is looked at. Where a parabola through neighbours says that a step may
 /// hold more than what was found so far, its middle is looked at as well, and so on inward. States
 /// come from the integrator; loads are those of the articulated-body method in SIMD lanes, so that
-/// a look costs a fraction of an evaluation. What is found depends on the steps alone.
+/// a look costs a fraction of an evaluation. Machines with closed loops are looked at as the
+/// simulation looks at its samples. What is found depends on the steps alone.
 class Extremes {
  public:
   /// Of the load of each joint, in this order: lengths of force and moment, their parts along and
-  /// across the joint's axis, and the power of its drive.
+  /// across the joint's axis, and the power of its drive. Joints that close loops come last.
   enum Derived { force, axial, radial, moment, tilting_moment, torque, drive_power, n_derived };
 
   /// The setup must outlive this. constant: torques [nv] beside the drives, or null; directions:
-  /// of the joints' axes in the joint frames [n_joints][3], NaN where there is no single one.
+  /// of the joints' axes in the joint frames [n_loads][3], NaN where there is no single one.
   Extremes(const Setup& setup, const double* constant, std::span<const double> directions);
+
+  /// How a simulation looks at a state at time t: it moves one between its own to where loops are
+  /// closed, and writes accelerations du [nv], loads [n_loads][6] and drive torques [nv] as those
+  /// of a sample. False: they are not known.
+  struct Evaluation {
+    std::function<void(double t, double* q, double* v)> close;
+    std::function<bool(double t, const double* q, const double* v, double* du, double* loads,
+                       double* drive)>
+        evaluate;
+  };
+  /// Every step is looked at by `evaluation`, before the next one is taken.
+  void evaluate_by(Evaluation evaluation) {
+    evaluation_ = std::move(evaluation);
+    block_ = 1;
+  }
 
   void begin(double t, const double* q, const double* v);
   /// A step from time() to t, and the state in its middle. breaks: the system takes another course
@@ -34,6 +52,8 @@ class Extremes {
   /// Until where steps were added.
   double time() const { return time_; }
 
+  /// Loads may have been larger by any amount between looks.
+  void leave_loads_open();
   /// Before a copy is made: drops what it does not need.
   void trim();
   /// What was found until time(), see size(); the last thing asked.
@@ -89,7 +109,7 @@ class Extremes {
     std::vector<double> value, time, reach, wrench;
   };
 
-  static size_t joints(const Model& model) { return static_cast<size_t>(model.n_joints()); }
+  static size_t joints(const Model& model) { return static_cast<size_t>(model.n_loads()); }
   static size_t motion(const Model& model) {
     return static_cast<size_t>(model.nq()) + 3 * static_cast<size_t>(model.nv());
   }
@@ -101,6 +121,7 @@ class Extremes {
   size_t append_given(size_t left, size_t right, const std::vector<double>& state);
   size_t append_middle(size_t left, size_t right);
   void evaluate(std::span<const size_t> rows);
+  void evaluate_each(std::span<const size_t> rows);
   void write_values(size_t row, const double* loads, const double* drive);
   void keep(std::span<const size_t> rows);
   void keep_state(size_t value, const double* motion);
@@ -122,6 +143,7 @@ class Extremes {
   const Model* model_;
   AppliedForces forces_;
   std::shared_ptr<BatchEvaluator> dynamics_, inverse_;
+  Evaluation evaluation_;  ///< in place of these
   std::vector<double> directions_;
   size_t width_, block_;
   double time_ = 0;

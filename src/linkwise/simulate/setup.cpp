@@ -103,7 +103,6 @@ void Setup::find_breakpoints() {
 
 void check_members(const Setup& setup) {
   const SimulationOptions& options = setup.options;
-  refuse_loops(*setup.model, "a batch", "simulate its members one after the other");
   if (options.dynamics.method != "articulated_body")
     throw InputError("method '" + options.dynamics.method + "': a batch takes articulated_body");
   if (options.state)

@@ -69,6 +69,7 @@ void Simulation::start(double t0, const Start& start) {
   extremes_.clear();
   for (size_t i = 0; i < members_ && !directions_.empty(); ++i) {
     extremes_.emplace_back(*setup_, start.tau ? start.tau + i * nv() : nullptr, directions_);
+    if (loops_) evaluate_for(extremes_[i]);
     extremes_[i].begin(t0, y_.data() + i * nq(), rates_in(y_.data()) + i * nv());
   }
   extremes_until_ = advanced_to_ = t0;
@@ -446,6 +447,7 @@ std::vector<double> Simulation::extremes(size_t member) {
     interpolate_step(advanced_to_);
     add_step(member, advanced_to_, false, whole);
   }
+  if (loops_ && !std::isnan(coasting_.passed())) whole.leave_loads_open();
   return std::move(whole).found();
 }
 
@@ -478,21 +480,26 @@ bool Simulation::powers(double t, double* out) {
   return known;
 }
 
+/// Of the state in y_: accelerations, loads and drive torques, as they are recorded.
+Outcome Simulation::evaluate_sample(double t, bool with_loads) {
+  du_.resize(members_ * nv());
+  with_loads |= loops_ && setup_->any_given();  // which give the torques that hold joints
+  loads_.resize(with_loads ? members_ * n_load() : 0);
+  if (any_ended()) stand_in(y_.data());
+  const long iterations = iterations_;
+  double* loads = with_loads ? loads_.data() : nullptr;
+  Outcome outcome = accelerations(output_method_.get(), t, y_.data(), du_.data(), loads);
+  if (loops_) outcome = steer_sample(t, outcome);
+  iterations_ = iterations;  // those of the record are not the integration's
+  if (outcome == Outcome::converged && output_method_) output_method_->accepted(t);
+  if (outcome == Outcome::converged && setup_->any_given()) add_holding_torques(loads_.data());
+  return outcome;
+}
+
 bool Simulation::write_sample(double t, const Sample& sample) {
-  if (sample.needs(Needs::forces)) {
-    du_.resize(members_ * nv());
-    const bool from_loads = loops_ && setup_->any_given();
-    loads_.resize(sample.needs(Needs::loads) || from_loads ? members_ * n_load() : 0);
-    if (any_ended()) stand_in(y_.data());
-    const long iterations = iterations_;
-    Outcome outcome = accelerations(output_method_.get(), t, y_.data(), du_.data(),
-                                    loads_.empty() ? nullptr : loads_.data());
-    if (loops_) outcome = steer_sample(t, outcome);
-    iterations_ = iterations;  // those of the record are not the integration's
-    if (outcome != Outcome::converged) return end_all(failure_);
-    if (output_method_) output_method_->accepted(t);
-    if (setup_->any_given()) add_holding_torques(loads_.data());
-  }
+  if (sample.needs(Needs::forces) &&
+      evaluate_sample(t, sample.needs(Needs::loads)) != Outcome::converged)
+    return end_all(failure_);
   const SimulationStatistics now = statistics();
   for (size_t i = 0; i < members_; ++i) {
     const Instant at{model(),

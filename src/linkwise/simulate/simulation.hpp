@@ -80,6 +80,8 @@ class Simulation : private OdeSystem {
   std::string force_doubt(size_t member = 0) const;
   /// With fixed steps: how much of the largest force that is; 0 where they are known well.
   double force_error(size_t member) const;
+  /// Where loads of closed loops have no bound, one line; empty: nowhere.
+  std::string loop_doubt() const;
   /// Ends what still runs.
   void stop(Outcome outcome) { end_all({outcome, integrator_->time(), "", describe(outcome)}); }
 
@@ -146,6 +148,9 @@ class Simulation : private OdeSystem {
   }
   Outcome steer(double t, Outcome outcome, double* dv, bool remember);
   Outcome steer_sample(double t, Outcome outcome);
+  void evaluate_for(Extremes& extremes);
+  bool evaluate_at(double t, const double* q, const double* v, double* du, double* loads,
+                   double* drive);
   Outcome judge(double t, const DynamicsReport& report, const double* du, int n);
   std::string described(Outcome outcome, int body = -1) const;
   Ending failure(size_t member, double t, Outcome outcome, int body, const double* du) const;
@@ -166,6 +171,7 @@ class Simulation : private OdeSystem {
   bool powers(double t, double* out);
   bool write_sample(double t, const Sample& sample);
   void check_sample(double t, size_t member, const Sample& sample);
+  Outcome evaluate_sample(double t, bool with_loads);
   void add_holding_torques(const double* loads);
   void calc_torques_of_loads(const double* loads);
 

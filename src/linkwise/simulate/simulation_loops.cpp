@@ -1,6 +1,8 @@
 // What a simulation does for joints that close loops.
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
+#include <sstream>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/forces/passive.hpp"
@@ -99,6 +101,42 @@ Outcome Simulation::steer_sample(double t, Outcome outcome) {
   outcome = steer(t, outcome, du_.data(), false);
   parent_axes_.derivative_to_child(q, v, du_.data());
   return outcome;
+}
+
+std::string Simulation::loop_doubt() const {
+  if (!loops_ || std::isnan(coasting_.passed())) return {};
+  std::ostringstream text;
+  text << "no bound of the loads holds: near t = " << std::setprecision(4) << coasting_.passed()
+       << " s the machine passes a singular position, where loads of its loops may grow without "
+          "limit, and peaks are those of the states that were looked at";
+  return text.str();
+}
+
+/// Loads between samples are those that a sample there would have.
+void Simulation::evaluate_for(Extremes& extremes) {
+  extremes.evaluate_by(
+      {[this](double t, double* q, double* v) {
+         impose_motion(model(), setup_->drives, t, q, v, given_.data());
+         loops_->project(q, v);
+       },
+       [this](double t, const double* q, const double* v, double* du, double* loads,
+              double* drive) { return evaluate_at(t, q, v, du, loads, drive); }});
+}
+
+/// What fails there ends nothing.
+bool Simulation::evaluate_at(double t, const double* q, const double* v, double* du, double* loads,
+                             double* drive) {
+  y_.assign(q, q + nq());
+  y_.insert(y_.end(), v, v + nv());
+  impose(t, y_.data());
+  const Ending failure = failure_;
+  const bool known = evaluate_sample(t, true) == Outcome::converged;
+  failure_ = failure;
+  if (!known) return false;
+  std::copy(du_.begin(), du_.end(), du);
+  std::copy(loads_.begin(), loads_.end(), loads);
+  std::copy_n(forces_->drive(0), nv(), drive);
+  return true;
 }
 
 /// What joints of given motion pass on along their axes, and what their rotors take, into total_.

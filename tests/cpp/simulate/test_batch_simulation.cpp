@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "dynamics/looped_machine.hpp"
 #include "linkwise/base/error.hpp"
 #include "linkwise/simd/lanes.hpp"
 #include "linkwise/simulate/batch_simulation.hpp"
@@ -297,6 +298,36 @@ TEST(BatchSimulation, RefusesWhatItCannotTake) {
   wrench.callable = [](double, double* out) { std::fill_n(out, 6, 0.0); };
   pushed.add_wrench(wrench);
   EXPECT_THROW(check_members(pushed.setup()), InputError);
+}
+
+// Loops are closed, eliminated and projected for each member by itself.
+TEST(BatchSimulation, OfClosedLoopsEqualsOneByOne) {
+  const auto model = make_model(row_of_four_bars(2));
+  const std::vector<double> times = {0, 0.05, 0.1};
+  constexpr size_t members = 3;
+  const size_t nq = model->nq(), nv = model->nv();
+  std::vector<double> q(members * nq), v(members * nv), at(members * times.size() * nq, 7);
+  for (size_t i = 0; i < members; ++i) q[i * nq] = 0.3 + 0.1 * static_cast<double>(i);
+  Sample samples;
+  samples["position"] = at.data();
+  Simulation shared(model, steps_of(1e-3));
+  const Simulation* const all[] = {&shared};
+  MemberNotes notes;
+  const auto ends = simulate_batch(all, {q.data(), v.data(), nullptr, members}, times, samples,
+                                   Executor(2), go_on, nullptr, &notes);
+  for (size_t i = 0; i < members; ++i) {
+    EXPECT_EQ(ends[i].outcome, Outcome::converged);
+    EXPECT_NE(notes.loops[i].assembled, "");
+    Simulation alone(model, steps_of(1e-3));
+    alone.start(0, {q.data() + i * nq, v.data() + i * nv});
+    for (size_t k = 0; k < times.size(); ++k) {
+      std::vector<double> own(nq);
+      Sample one;
+      one["position"] = own.data();
+      ASSERT_TRUE(alone.advance(times[k], one));
+      for (size_t c = 0; c < nq; ++c) EXPECT_EQ(at[(i * times.size() + k) * nq + c], own[c]);
+    }
+  }
 }
 
 }  // namespace

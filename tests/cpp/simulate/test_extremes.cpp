@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "dynamics/looped_machine.hpp"
 #include "linkwise/simulate/extremes.hpp"
 #include "simulate/recording.hpp"
 
@@ -48,6 +50,37 @@ TEST(Extremes, DoNotDependOnTheTimesAskedFor) {
     const auto often = extremes_until(2, 777, fixed_step(1e-2, kind));
     for (size_t i = 0; i < once.size(); ++i) EXPECT_EQ(once[i], often[i]) << kind << ' ' << i;
   }
+}
+
+// Each state between steps is that of a sample: found by few samples and by many.
+TEST(Extremes, OfClosedLoopsAreThoseOfDenseSamples) {
+  const auto model = make_model(row_of_four_bars(2));
+  const size_t joints = model->n_loads();
+  const std::vector<double> directions(3 * joints, 0.0);
+  std::vector<double> q(model->nq()), v(model->nv());
+  q[0] = 0.3;
+  Simulation seldom(model, fixed_step(1e-2)), often(model, fixed_step(1e-2));
+  seldom.keep_extremes(directions);
+  seldom.start(0, {q.data(), v.data()});
+  ASSERT_TRUE(seldom.advance(0.4, Sample()));
+  const std::vector<double> found = seldom.extremes();
+  ASSERT_EQ(found.size(), Extremes::size(*model));
+  often.start(0, {q.data(), v.data()});
+  std::vector<double> load(6 * joints), largest(joints);
+  Sample sample;
+  sample["joint_load"] = load.data();
+  for (int k = 0; k <= 400; ++k) {
+    ASSERT_TRUE(often.advance(1e-3 * k, sample));
+    for (size_t j = 0; j < joints; ++j)
+      largest[j] = std::max(largest[j], std::hypot(load[6 * j], load[6 * j + 1], load[6 * j + 2]));
+  }
+  const size_t states = 2 * joints * Extremes::state_size(*model);
+  const size_t width = (found.size() - 12 * Extremes::n_derived * joints - states) / 6;
+  for (size_t j = 0; j < joints; ++j) {
+    EXPECT_NEAR(found[3 * width + j], largest[j], 1e-3 * largest[j]) << j;
+    EXPECT_TRUE(std::isfinite(found[5 * width + j])) << j;  // its bound
+  }
+  EXPECT_EQ(seldom.loop_doubt(), "");
 }
 
 }  // namespace

@@ -58,10 +58,11 @@ TEST(FixedStepForces, OfMembersTheWorstIsNamed) {
   std::vector<double> position(n);
   Sample samples;
   samples["position"] = position.data();
-  ForcesOfMembers doubt;
+  MemberNotes notes;
   simulate_batch(
       all, {q.data(), v.data(), nullptr, n}, times, samples, Executor(2), [] { return true; },
-      nullptr, &doubt);
+      nullptr, &notes);
+  const ForcesOfMembers& doubt = notes.forces;
   EXPECT_EQ(doubt.members, 2u);
   EXPECT_TRUE(doubt.worst == 2 || doubt.worst == 4);
   EXPECT_NE(doubt.text, "");
