@@ -24,10 +24,12 @@ from linkwise.io import writing
 from linkwise.view import arrows
 from linkwise.view.live import View
 from linkwise.view.panel import legend
+from linkwise.view.places import Places
+from linkwise.view.pose import Pose
 from linkwise.view.server import LOCAL, client_page, replay, running
 from linkwise.view.shapes import quaternions
 from linkwise.view.shown_loads import rating_use
-from linkwise.view.source import Source, static_loads
+from linkwise.view.source import Source
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -51,7 +53,7 @@ class Exported(NamedTuple):
 class Animation(NamedTuple):
     """What moves, over the frames of the film.
 
-    poses: (frames, n, 7: position, quaternion with its scalar first) of the joint frames, then of
+    poses: (frames, n, 7: position, quaternion with its scalar first) of the joints' places, then of
     those links' frames that are not one of them; link_poses: where each link's is in there;
     loads: (frames, causes, n_joints, 6) of the causes named.
     """
@@ -132,13 +134,14 @@ def write_html(
     return Exported(Path(path), animation.times.size, duration, len(page.encode("utf-8")))
 
 
-def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
-    """Where each link's pose is among those of the joint frames and then of other links.
+def _link_poses(model: Model, places: Places, q: Array) -> npt.NDArray[np.int64]:
+    """Where each link's pose is among those of the joints' places and then of other links.
 
     A body is named after one of its links, whose frame is the joint's in most files: two frames of
     one rigid body that agree in one position agree in all.
     """
-    links, joints = _core.link_poses(model, q), _core.joint_poses(model, q)
+    links = _core.link_poses(model, q)
+    joints = places.frames(links, q)
     index = {name: k for k, name in enumerate(model.link_names)}
     found = np.full(len(links), -1)
     for joint, body in enumerate(model.child_link_names):
@@ -149,17 +152,18 @@ def _link_poses(model: Model, q: Array) -> npt.NDArray[np.int64]:
     return found
 
 
-def _poses(model: Model, q: Array, link_poses: npt.NDArray[np.int64]) -> Array:
-    links = _core.link_poses(model, q)[link_poses >= model.n_joints]
-    frames = np.concatenate([_core.joint_poses(model, q), links])
+def _poses(model: Model, places: Places, q: Array, link_poses: npt.NDArray[np.int64]) -> Array:
+    links = _core.link_poses(model, q)
+    joints = places.frames(links, q)
+    frames = np.concatenate([joints, links[link_poses >= len(joints)]])
     return np.concatenate([frames[:, :3, 3], quaternions(frames[:, :3, :3])], axis=1)
 
 
 def _still(source: Source) -> Animation:
-    model = source.model
-    q = model.initial_configuration()
-    where = _link_poses(model, q)
-    poses, loads = _poses(model, q, where)[None], static_loads(model, q)[None, None]
+    model, places, pose = source.model, Places(source.model), Pose(source.model)
+    q = pose.assembled(model.initial_configuration(), None)
+    where = _link_poses(model, places, q)
+    poses, loads = _poses(model, places, q, where)[None], pose.loads(q)[None, None]
     return Animation(np.zeros(1), poses.astype(np.float32), where, loads.astype(np.float32), [])
 
 
@@ -168,13 +172,15 @@ def _film(source: Source) -> Animation:
     assert recording is not None
     causes = recording.causes.names if recording.causes is not None else []
     parts = max(1, len(causes)) if recording.has_loads else 0
-    where = _link_poses(model, recording.position(0))
-    n_poses = max(model.n_joints, int(where.max(initial=-1)) + 1)
-    chosen = frame_samples(recording.times, 4 * (7 * n_poses + 6 * parts * model.n_joints))
+    places = Places(model)
+    n_joints = len(places.names)
+    where = _link_poses(model, places, recording.position(0))
+    n_poses = len(_poses(model, places, recording.position(0), where))
+    chosen = frame_samples(recording.times, 4 * (7 * n_poses + 6 * parts * n_joints))
     poses = np.empty((chosen.size, n_poses, 7), dtype=np.float32)
-    loads = np.empty((chosen.size, parts, model.n_joints, 6), dtype=np.float32)
+    loads = np.empty((chosen.size, parts, n_joints, 6), dtype=np.float32)
     for k, sample in enumerate(chosen):
-        poses[k] = _poses(model, recording.position(sample), where)
+        poses[k] = _poses(model, places, recording.position(sample), where)
         if parts and not causes:
             loads[k, 0] = recording.load(sample)
     if causes:
@@ -195,7 +201,7 @@ def _content(source: Source, scene: Scene, animation: Animation) -> dict[str, An
     for layer in layers:
         if "links" in layer:
             layer["links"] = animation.link_poses[layer["links"]]
-    names = source.model.joint_names
+    names = scene.places.names
     use = rating_use(source.model, source.ratings, needed=False)
     rating = None
     if use is not None:

@@ -11,6 +11,8 @@ from linkwise.base import Array
 from linkwise.record.labels import joint_scalars
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import viser
 
     from linkwise._core import Model
@@ -23,6 +25,7 @@ class JointSliders:
     """One slider per coordinate, between its limits; of long models those of the first joints.
 
     The four coordinates of a quaternion are set by three angles, about x, then y, then z.
+    moved: the joint that a person moved last, None before that.
     """
 
     def __init__(
@@ -31,12 +34,14 @@ class JointSliders:
         self._model = model
         self.q = model.initial_configuration()
         self._sliders: list[Any] = []
-        self._resets: list[float] = []
+        self._reads: list[Callable[[], float]] = []
+        self.moved: str | None = None
         joints = self._shown_joints()
         with server.gui.add_folder("Joints"):
             server.gui.add_button("Zero").on_click(lambda event: self._reset(requests))
             for joint in joints:
                 self._add_joint(server, joint, size, requests)
+            self._start = self.q.copy()
             if len(joints) < model.n_joints:
                 server.gui.add_markdown(f"{model.n_joints - len(joints)} more joints stay at zero.")
 
@@ -68,7 +73,10 @@ class JointSliders:
             def move(value: float, at: int = at) -> None:
                 self.q[at] = value
 
-            self._add(server, label, low, high, requests, move, start)
+            def read(at: int = at) -> float:
+                return float(self.q[at])
+
+            self._add(server, joint, label, low, high, requests, move, read, start)
         if turning:
             name = model.joint_names[joint]
             where = slice(first + turning[0], first + turning[0] + 4)
@@ -79,18 +87,25 @@ class JointSliders:
                     angles[axis] = value
                     self.q[where] = quaternion_of(angles)
 
+                def read_angle(axis: int = axis) -> float:
+                    angles[axis] = angles_of(self.q[where])[axis]
+                    return float(angles[axis])
+
                 label = f"{name}.{'xyz'[axis]} [rad]"
                 start = angles[axis]
-                self._add(server, label, -math.pi, math.pi, requests, turn, start)
+                ends = (-math.pi, math.pi)
+                self._add(server, joint, label, *ends, requests, turn, read_angle, start)
 
     def _add(
         self,
         server: Any,
+        joint: int,
         label: str,
         low: float,
         high: float,
         requests: Requests,
         act: Any,
+        read: Callable[[], float],
         start: Any,
     ) -> None:
         value = float(np.clip(start, low, high))
@@ -100,16 +115,27 @@ class JointSliders:
         )
 
         def move(event: Any) -> None:
+            if event.client is None:  # by `follow` or `_reset`
+                return
             act(slider.value)
+            self.moved = self._model.joint_names[joint]
             requests.redraw = True
 
         slider.on_update(move)
         self._sliders.append(slider)
-        self._resets.append(value)
+        self._reads.append(read)
+
+    def follow(self, q: Array) -> None:
+        """Show this position, where closing the loops moved other joints than the one in hand."""
+        if np.array_equal(q, self.q):
+            return
+        self.q[:] = q
+        for slider, read in zip(self._sliders, self._reads, strict=True):
+            slider.value = float(np.clip(read(), slider.min, slider.max))
 
     def _reset(self, requests: Requests) -> None:
-        for slider, value in zip(self._sliders, self._resets, strict=True):
-            slider.value = value  # its callback sets the coordinate
+        self.moved = None
+        self.follow(self._start)
         requests.redraw = True
 
 

@@ -23,10 +23,11 @@ from linkwise.view.panel import (
     legend,
 )
 from linkwise.view.playback import Playback, sample_at
+from linkwise.view.pose import Pose
 from linkwise.view.scene import Scene
 from linkwise.view.server import running
 from linkwise.view.shown_loads import rating_use
-from linkwise.view.source import Recording, Source, static_loads
+from linkwise.view.source import Recording, Source
 
 if TYPE_CHECKING:
     import viser
@@ -68,6 +69,7 @@ class View:
             self._playback = Playback(float(recording.times[0]), float(recording.times[-1]))
             self._controls = PlaybackControls(server, self._playback, self._requests)
         self._sliders: JointSliders | None = None
+        self._pose = Pose(source.model)
         if recording is None and posable:
             self._sliders = JointSliders(
                 server, source.model, 0.5 * self.scene.size, self._requests
@@ -81,7 +83,7 @@ class View:
     ) -> None:
         with server.gui.add_folder("Joint load"):
             self._legend = server.gui.add_html(legend(self._largest, by_rating))
-            names = self._source.model.joint_names
+            names = self.scene.places.names
             self._choice = JointChoice(server, self.scene, names, self._requests)
             if recording is not None:
                 self._plot = LoadPlot(server, recording)
@@ -102,7 +104,7 @@ class View:
             self.scene.toggle(*self._requests.toggles.popitem())
         requests = self._take_load_choices() or requests
         if self._requests.joint is not None:
-            self._joint = self._source.model.joint_index(self._requests.joint)
+            self._joint = self.scene.places.names.index(self._requests.joint)
             self._requests.joint = None
             if self._plot is not None:
                 self._plot.choose(self._joint)
@@ -135,8 +137,12 @@ class View:
 
     def _draw_pose(self) -> None:
         model = self._source.model
-        q = model.initial_configuration() if self._sliders is None else self._sliders.q.copy()
-        loads = static_loads(model, q)
+        if self._sliders is None:
+            q = self._pose.assembled(model.initial_configuration(), None)
+        else:
+            q = self._pose.assembled(self._sliders.q.copy(), self._sliders.moved)
+            self._sliders.follow(q)
+        loads = self._pose.loads(q)
         largest = tuple(
             float(lengths(half).max(initial=0.0)) for half in (loads[:, :3], loads[:, 3:])
         )
@@ -144,7 +150,7 @@ class View:
         self.scene.style.largest = self._largest
         self.scene.show(self.scene.at(q, loads))
         self._legend.content = legend(self._largest, self.scene.style.use is not None)
-        self._tell("held still: ", loads[self._joint])
+        self._tell("held still: ", loads[self._joint], self._pose.told)
 
     def _draw_sample(self, recording: Recording, seconds: float, forced: bool) -> None:
         playback = self._playback
@@ -168,10 +174,11 @@ class View:
                     f"t = {recording.times[sample]:.4g} s: ", recording.load(sample)[self._joint]
                 )
 
-    def _tell(self, head: str, load: np.ndarray) -> None:
+    def _tell(self, head: str, load: np.ndarray, tail: str = "") -> None:
         if self._choice is not None:
             force, moment = lengths(load.reshape(2, 3))
-            self._choice.tell(f"{head}{force:.4g} N, {moment:.4g} N m")
+            tail = f"; {tail}" if tail else ""
+            self._choice.tell(f"{head}{force:.4g} N, {moment:.4g} N m{tail}")
 
 
 def show(

@@ -15,6 +15,7 @@ from linkwise.view.playback import SPEEDS, Playback
 if TYPE_CHECKING:
     import viser
 
+    from linkwise._core import Model
     from linkwise.view.scene import Scene
     from linkwise.view.source import Source
 
@@ -186,7 +187,13 @@ class JointChoice:
 def headline(source: Source) -> str:
     """What is shown, as HTML."""
     model = source.model
-    lines = [f"<b>{escape(source.title)}</b>: {model.n_joints} joints, {model.total_mass:.4g} kg"]
+    lines = [f"<b>{escape(source.title)}</b>: {_counted(model)}, {model.total_mass:.4g} kg"]
     lines += [escape(note) for note in source.notes]
     lines += [escape(f"warning: {line}") for line in warning_lines(source.warnings)]
     return f'<div style="padding:4px 12px;font-size:13px">{"<br>".join(lines)}</div>'
+
+
+def _counted(model: Model) -> str:
+    count = model.n_joints + model.n_loops
+    closing = f", {model.n_loops} of which close loops" if model.n_loops else ""
+    return f"{count} joints{closing}"

@@ -24,7 +24,8 @@ Indices = npt.NDArray[np.int64]
 
 @dataclass
 class Snapshot:
-    """The machine at one instant: frames of links and joints (n, 4, 4), loads (n_joints, 6)."""
+    """The machine at one instant: frames of links (n, 4, 4), of joints as `Places` has them,
+    and loads (n_joints, 6) of all joints with a load."""
 
     links: Array
     joints: Array
@@ -77,7 +78,7 @@ class Following:
 
 @dataclass
 class Spanning:
-    """Rods between joint points: a sliding joint changes their length."""
+    """Rods between places: a sliding joint changes their length."""
 
     inboard: Indices
     outboard: Indices
@@ -117,10 +118,12 @@ class Lines:
 
 @dataclass
 class Marks:
-    """One at every joint point."""
+    """One at every joint point, loop joints included."""
+
+    count: int
 
     def __call__(self, snapshot: Snapshot) -> dict[str, Array]:
-        return {"batched_positions": snapshot.joints[:, :3, 3]}
+        return {"batched_positions": snapshot.joints[: self.count, :3, 3]}
 
     def plan(self) -> dict[str, Any]:
         return {"kind": "marks"}

@@ -25,6 +25,7 @@ from linkwise.view.placement import (
     Snapshot,
     Spanning,
 )
+from linkwise.view.places import Places
 from linkwise.view.shapes import (
     Mesh,
     equivalent_boxes,
@@ -73,6 +74,7 @@ class Scene:
         self._scene = server.scene
         self._model = model = source.model
         self._inboard = np.array(model.joint_parents, dtype=int)
+        self.places = Places(model)
         self._few = model.n_joints <= _MANY
         self.layers: dict[str, list[Layer]] = defaultdict(list)
         self.joint_marks: Any = None
@@ -92,7 +94,9 @@ class Scene:
         self._add_shapes(bare="Meshes" not in self.toggles)
         if source.recording is None or source.recording.has_loads:
             shown = source.recording is not None
-            peaks = source.recording.peaks if source.recording else np.zeros(model.n_joints)
+            peaks = np.zeros(len(self.places.names))
+            if source.recording is not None:
+                peaks = source.recording.peaks
             self._add_loads(shown=shown, peaks=peaks)
         self._frame_camera(server)
         for name, shown in self.toggles.items():
@@ -102,7 +106,7 @@ class Scene:
 
     def at(self, q: Array, loads: Array | None) -> Snapshot:
         links = _core.link_poses(self._model, q)
-        return Snapshot(links, _core.joint_poses(self._model, q), loads)
+        return Snapshot(links, self.places.frames(links, q), loads)
 
     def show(self, snapshot: Snapshot) -> None:
         self._snapshot = snapshot
@@ -221,17 +225,19 @@ class Scene:
                 self.layers[toggle].append(Layer(handle, Following(chosen, offsets[chosen])))
         outboard = np.flatnonzero(inboard >= 0)
         thick = self._thickness()
-        if outboard.size:
+        spans = np.concatenate([np.column_stack([inboard[outboard], outboard]), self.places.spans])
+        if len(spans):
             handle = self._add(
                 links,
                 bare and few,
                 unit_cylinder(8) if few else turned([(1, -0.5), (1, 0.5)], 4),
-                outboard.size,
-                batched_scales=np.ones((outboard.size, 3)),
+                len(spans),
+                batched_scales=np.ones((len(spans), 3)),
                 batched_colors=_ROD_TONE,
             )
-            rods = Spanning(inboard[outboard], outboard, 0.55 * thick)
+            rods = Spanning(spans[:, 0], spans[:, 1], 0.55 * thick)
             self.layers[links].append(Layer(handle, rods))
+        self._add_rods(0.35 * thick)
         if model.n_joints > _THIN:  # lines keep their width on the screen, however far away
             ends = _sparse_tree(inboard, model.n_joints if few else _SPARSE_POINTS)
             lines = self._scene.add_line_segments(
@@ -247,15 +253,29 @@ class Scene:
             "Joints",
             bare and few,
             unit_sphere(12 if few else 6),
-            model.n_joints,
-            batched_scales=np.full(model.n_joints, thick),
+            len(self.places.names),
+            batched_scales=np.full(len(self.places.names), thick),
             batched_colors=_MARK_TONE,
         )
-        self.layers["Joints"].append(Layer(self.joint_marks, Marks()))
+        self.layers["Joints"].append(Layer(self.joint_marks, Marks(len(self.places.names))))
+
+    def _add_rods(self, radius: float) -> None:
+        """Rods without mass, which no link stands for: shown whatever else is."""
+        rods = self.places.rods
+        if len(rods):
+            handle = self._add(
+                "Rods",
+                True,
+                unit_cylinder(12),
+                len(rods),
+                batched_scales=np.ones((len(rods), 3)),
+                batched_colors=_MARK_TONE,
+            )
+            self.layers["Rods"].append(Layer(handle, Spanning(rods[:, 0], rods[:, 1], radius)))
 
     def _thickness(self) -> float:
         """Radius of the joint marks: small beside the links and, of short chains, the machine."""
-        points = self._snapshot.joints[:, :3, 3]
+        points = self._snapshot.joints[: self._model.n_joints, :3, 3]
         spans = np.linalg.norm(points - points[self._inboard], axis=1)[self._inboard >= 0]
         spans = spans[spans > 1e-6 * self.size]
         typical = float(np.mean(spans)) if spans.size else self.size
@@ -267,7 +287,7 @@ class Scene:
         """Arrows and arcs; of large machines at joints here and there and at the most loaded one,
         and, unless switched on, hidden ones at every joint.
         """
-        every = np.arange(self._model.n_joints)
+        every = np.arange(len(self.places.names))
         arrow, arc = unit_arrow(10), unit_arc(6, 28)
         if not self._few:
             here = np.linspace(0, every.size - 1, _SPARSE_LOADS).astype(int)

@@ -95,9 +95,11 @@ class RatingUse:
     """How much of their ratings loads use; NaN for joints without any."""
 
     def __init__(self, model: Model, ratings: Mapping[str, Rating]) -> None:
-        self.directions = joint_directions(model)[: model.n_joints]
+        self.directions = joint_directions(model)
         names = [name for half in _HALVES for name in half]
-        table = rating_table(ratings, model.joint_names, [*names, "drive_power"])
+        table = rating_table(
+            ratings, [*model.joint_names, *model.loop_names], [*names, "drive_power"]
+        )
         self.limits = dict(zip(names, table, strict=False))
         """Ratings (n_joints,) of a quantity, NaN where there is none."""
         self.known = bool(np.isfinite(table[:-1]).any())

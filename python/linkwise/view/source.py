@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from linkwise._core import InputError, Model, inverse_dynamics_loads
+from linkwise._core import InputError, Model
 from linkwise.base import Array, rows_per_block
 from linkwise.io.complaint import near, shorten
 from linkwise.io.load import load
@@ -59,18 +59,19 @@ class Recording:
         self._check(run, model)
         self.times: Array = np.asarray(run.dataset["time"].values, dtype=float)
         self._run = run
-        self._row_bytes = 8 * (model.nq + (6 * model.n_joints if loads else 0))
+        n_joints = model.n_joints + model.n_loops
+        self._row_bytes = 8 * (model.nq + (6 * n_joints if loads else 0))
         self._first = self._last = 0
         self._positions = np.zeros((0, model.nq))
-        self._loads = np.zeros((0, model.n_joints, 6))
+        self._loads = np.zeros((0, n_joints, 6))
         self.largest = (0.0, 0.0)
-        self.peaks: Array = np.zeros(model.n_joints)
+        self.peaks: Array = np.zeros(n_joints)
         self.causes: CauseLoads | None = None
         if loads:
             if not model.n_loops and not model.coupling_names:  # which take no causes yet
                 self.causes = CauseLoads(run, model)
             peaks = run.peak_loads()
-            self.peaks = np.asarray(peaks["force"].values)[: model.n_joints]
+            self.peaks = np.asarray(peaks["force"].values)
             self.largest = (float(peaks["force"].max()), float(peaks["moment"].max()))
 
     def _check(self, run: Run, model: Model) -> None:
@@ -101,7 +102,7 @@ class Recording:
             block = slice(self._first, self._last)
             self._positions = rows(self._run, "position", block)
             if self.has_loads:
-                self._loads = rows(self._run, "joint_load", block)[:, : self.peaks.size]
+                self._loads = rows(self._run, "joint_load", block)
         return sample - self._first
 
     def position(self, sample: int) -> Array:
@@ -149,15 +150,6 @@ class Source:
     warnings: Sequence[Mapping[str, str]] = ()
 
 
-def static_loads(model: Model, q: Array) -> Array:
-    """Loads (n_joints, 6) while the machine is held still in the pose q; of machines with loops
-    zeros, because how these share the weight depends on what holds them."""
-    if model.n_loops or model.coupling_names:
-        return np.zeros((model.n_joints, 6))
-    rest = np.zeros(model.nv)
-    return inverse_dynamics_loads(model, q, rest, rest)
-
-
 def open_source(target: PathLike, options: Options) -> Source:
     """What `linkwise view TARGET` shows: a folder is a run, a file is a model or a scenario.
 
@@ -176,8 +168,6 @@ def open_source(target: PathLike, options: Options) -> Source:
     ratings = _ratings(options, held)
     ignored = plain_warnings(warnings_of(model))
     notes = _notes(appearance)
-    if model.n_loops:
-        notes.append("loads of machines with closed loops are those of a run; poses may open loops")
     return Source(model.name, model, appearance, None, ratings, notes, ignored)
 
 

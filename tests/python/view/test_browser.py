@@ -12,6 +12,7 @@ import pytest
 
 import linkwise as lw
 from helpers.browser import PATIENCE, WINDOW
+from helpers.press_sdf import PRESS
 from linkwise.view.export import write_html
 from linkwise.view.scene import Scene
 from linkwise.view.server import running
@@ -210,6 +211,35 @@ def test_model_is_posed_with_sliders(serve, page):
     wait_for(page, lambda image: changed(image, before) < 50, "back at zero")
 
 
+def rod_machine():
+    """Two bars on the ground, whose ends a rod joins."""
+    builder = lw.ModelBuilder("rod")
+    builder.add_link("ground")
+    for name, x in (("left", 0.0), ("right", 1.5)):
+        builder.add_link(name, mass=1, com=[0, 0, 0.5], inertia=np.diag([0.1, 0.1, 0.001]))
+        turn = {"axis": [0, 1, 0], "translation": [x, 0, 0]}
+        builder.add_joint(f"turn_{name}", "revolute", "ground", name, **turn)
+    ends = {"point": [0, 0, 1], "child_point": [0, 0, 1]}
+    builder.add_rod("tie", "left", "right", length=1.5, **ends)
+    return builder.build()
+
+
+def test_a_looped_machine_is_posed_closed(serve, page):
+    open_page(page, serve(Source("rod", rod_machine(), Appearance([], [], []))))
+    before = still(page)
+    page.get_by_text("held by turn_left").wait_for()
+    first, second = page.get_by_role("slider").all()[:2]
+    for _ in range(25):
+        first.press("ArrowRight")
+    wait_for(page, lambda image: changed(image, before) > 200, "moved")
+    angle = float(first.get_attribute("aria-valuenow"))
+    assert angle > 0.1
+    end = time.monotonic() + PATIENCE
+    while abs(float(second.get_attribute("aria-valuenow")) - angle) > 0.01:  # a parallelogram
+        assert time.monotonic() < end, "the other bar does not follow"
+        time.sleep(0.1)
+
+
 MADE = """frame => {
   const {player, place} = linkwise, made = {};
   const plain = updates => Object.fromEntries(
@@ -266,6 +296,29 @@ def test_exported_page_plays_and_toggles_without_a_network(run_path, ratings_pat
     to_end(page)
     check_toggles_and_choices(page, run_path)
     assert [url for url in asked if not url.startswith(("file:", "blob:", "data:"))] == []
+
+
+def test_exported_loop_joints_and_rods_are_those_of_the_view(tmp_path, page):
+    """Two loops: a rod, and a hinge that closes a four-bar; every place is as `placement` says."""
+    rod, press = rod_machine(), lw.load(PRESS)
+    lw.simulate(rod, duration=1, every=0.05, q0=[0.4, 0.4], output=tmp_path / "rod.zarr")
+    turned = [0.7, -1.1, 0.0]
+    lw.simulate(press, duration=0.5, every=0.05, q0=turned, output=tmp_path / "press.zarr")
+    for name, joint in (("rod", "tie"), ("press", "wrist")):
+        source = open_source(tmp_path / f"{name}.zarr", Options())
+        assert source.recording.load(0).shape == (len(source.model.joint_names) + 1, 6)
+        written = write_html(source, tmp_path / f"{name}.html")
+        open_page(page, written.path.as_uri())
+        page.get_by_role("button", name="Pause").click()
+        page.get_by_text("1 of which close loops").wait_for()
+        for sample in (0, 7):
+            assert_same_instances(page, source, sample)
+        assert (page.get_by_role("checkbox", name="Rods").count() == 1) == (name == "rod")
+        page.get_by_role("combobox", name="Joint").click()
+        page.get_by_role("option", name=joint).click()
+        page.get_by_role("slider").first.press("Home")
+        force = np.linalg.norm(lw.open_run(tmp_path / f"{name}.zarr").joint_load[0, -1, :3])
+        told_force(page, force)
 
 
 def test_exported_model_is_a_still(tmp_path, page):

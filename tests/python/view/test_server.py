@@ -11,9 +11,10 @@ import pytest
 import linkwise as lw
 from helpers.browser import PATIENCE
 from linkwise.view.export import frame_samples, write_html
+from linkwise.view.pose import Pose
 from linkwise.view.scene import Scene
 from linkwise.view.server import running
-from linkwise.view.source import Appearance, Options, Source, open_source, static_loads
+from linkwise.view.source import Appearance, Options, Source, open_source
 
 pytest.importorskip("viser", reason="the view needs viser: pip install '.[view]'")
 
@@ -79,7 +80,7 @@ def work_of_a_picture(n):
         scene.style.largest = (1e5, 1.0)
         server._websock_server.queue_message = sent.append
         q = np.full(model.nq, 1e-4)
-        instant = scene.at(q, static_loads(model, q))
+        instant = scene.at(q, Pose(model).loads(q))
         before = sys.getprofile()
         gc.collect()  # what is left of other tests must not be cleared, and counted, within
         gc.disable()

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 import linkwise as lw
-from helpers.press_sdf import PRESS
 from linkwise import base
 from linkwise.io.urdf_visuals import read_appearance
 from linkwise.record.model import GROUP, read_model
-from linkwise.view.source import Options, open_source, static_loads
+from linkwise.view.source import Options, open_source
 
 URDF = """<robot name="arm">
   <material name="blue"><color rgba="0 0 1 1"/></material>
@@ -91,12 +90,6 @@ def test_recording_gives_the_samples_of_the_run(run_path, arm, monkeypatch):
     assert set(times) == set(run.time.values[np.linspace(0, 40, 9).astype(int)]) | own
     assert (times[0], times[-1]) == (0.0, 2.0)
     assert np.array_equal(loads[-1], run.joint_load.values[-1, 2])
-
-
-def test_static_loads_carry_the_weight(urdf):
-    model = lw.load(urdf)
-    load = static_loads(model, np.zeros(1))
-    assert load[0] == pytest.approx([0, 0, 2 * 9.81, 0, 0, 0], abs=1e-12)
 
 
 def test_the_appearance_is_read_and_nothing_is_fetched(urdf, tmp_path):
@@ -197,12 +190,3 @@ def test_loads_of_another_machine_are_refused(urdf, tmp_path):
     held = run.load_model()
     again = lw.loads.split(lw.open_run(tmp_path / "run.zarr"), "force", held)
     assert again.identical(lw.loads.split(run, "force"))
-
-
-def test_a_machine_with_loops_is_shown_without_loads(tmp_path):
-    path = tmp_path / "press.sdf"
-    path.write_text(PRESS)
-    source = open_source(path, Options())
-    assert source.model.n_loops == 1
-    assert any("closed loops" in note for note in source.notes)
-    assert not static_loads(source.model, source.model.initial_configuration()).any()
