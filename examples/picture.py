@@ -50,13 +50,16 @@ def draw_machine(axis, run, times, tips, view):
     model = run.load_model()
     across, up = ("xyz".index(letter) for letter in view)
     names = model.joint_names
-    for when, grey in zip(times, np.linspace(0.8, 0.0, len(times)), strict=True):
+    greys = np.linspace(0.8, 0.0, len(times)) if len(times) > 1 else [0.0]
+    for when, grey in zip(times, greys, strict=True):
         q = run.position.sel(time=when, method="nearest").values
         poses = np.asarray(lw.joint_poses(model, q))
         style = {"color": str(grey), "linewidth": 1.2, "markersize": 2.5}
         if len(names) > 100:
             style |= {"markersize": 0}
         for line in lines(model, poses, {j: np.append(p, 1.0) for j, p in tips.items()}):
+            axis.plot(line[:, across], line[:, up], "o-", **style)
+        for line in closing_lines(model, q, poses):
             axis.plot(line[:, across], line[:, up], "o-", **style)
         for joint, point in tips.items():
             end = poses[names.index(joint)] @ np.append(point, 1.0)
@@ -83,3 +86,18 @@ def lines(model, poses, tips):
             seen.add(joint)
             joint = parents[joint]
         yield np.array(points)
+
+
+def closing_lines(model, q, poses):
+    """Points (n, 3) from the joints of the two links that a loop joint joins to its place on them,
+    and from end to end of a rod."""
+    links = dict(zip(model.link_names, lw.link_poses(model, q), strict=True))
+    joint_of = {link: k for k, link in enumerate(model.child_link_names)}
+    ends = zip(model.loop_parent_link_names, model.loop_child_link_names, strict=True)
+    for (parent, child), places in zip(ends, model.loop_placements, strict=True):
+        line = []
+        for link, place, order in ((parent, places[0], 1), (child, places[1], -1)):
+            there = (links[link] @ place)[:3, 3]
+            start = [poses[joint_of[link]][:3, 3]] if link in joint_of else []
+            line += [*start, there][::order]
+        yield np.array(line)

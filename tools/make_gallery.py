@@ -18,6 +18,15 @@ SHOWN = (
     "10_anymal_legs",
     "03_chain_1000",
     "08_crane_loads",
+    "12_four_bar",
+    "13_excavator",
+    "14_five_bar",
+    "15_delta_robot",
+    "16_stewart_platform",
+    "17_scissor_lift",
+    "18_press",
+    "19_door",
+    "20_hanging_chain",
 )
 HEAD = """# Gallery
 
