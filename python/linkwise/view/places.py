@@ -15,11 +15,14 @@ if TYPE_CHECKING:
     from linkwise._core import Model
 
 
+_LINES = ("rod", "spring")  # types of what stands between two points
+
+
 class Places:
     """The frames of a machine's joints.
 
     names: the joints with a load, those of the tree first, as runs have them; spans: from the joint
-    of each link to where loop joints meet it (n, 2); rods: the two ends of each rod (n, 2), as
+    of each link to where loop joints meet it (n, 2); rods: the two ends of each rod and spring (n, 2), as
     numbers of places.
     """
 
@@ -39,7 +42,7 @@ class Places:
             if name in joint_of
         ]
         self.spans: npt.NDArray[np.int64] = np.array(met, dtype=int).reshape(-1, 2)
-        rods = [(first + n + k, first + k) for k, t in enumerate(model.loop_types) if t == "rod"]
+        rods = [(first + n + k, first + k) for k, t in enumerate(model.loop_types) if t in _LINES]
         self.rods: npt.NDArray[np.int64] = np.array(rods, dtype=int).reshape(-1, 2)
 
     def frames(self, links: Array, q: Array) -> Array:
