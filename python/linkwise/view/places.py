@@ -22,8 +22,8 @@ class Places:
     """The frames of a machine's joints.
 
     names: the joints with a load, those of the tree first, as runs have them; spans: from the joint
-    of each link to where loop joints meet it (n, 2); rods: the two ends of each rod and spring (n, 2), as
-    numbers of places.
+    of each link to where loop joints meet it (n, 2); rods: the two ends of each rod and spring
+    (n, 2), as numbers of places.
     """
 
     def __init__(self, model: Model) -> None:
