@@ -18,13 +18,13 @@ nb::object loads_by_cause(const PyModel& self, const std::vector<std::string>& n
   const std::vector<Cause> causes = causes_from_names(names);
   const States s(m, q, v, tau, "tau", external, prescribed);
   const Executor executor = executor_for(whole_number(threads, "threads"), s.count * m.n_bodies());
-  NewArray loads(s.lead, {causes.size(), size(m.n_joints()), 6});
+  NewArray loads(s.lead, {causes.size(), size(m.n_loads()), 6});
   const EvaluationReport report = without_gil([&](const GoOn& go_on) {
     return self.evaluator.loads_by_cause(s.count, s.input(), causes, method, executor, loads.data,
                                          go_on);
   });
   if (!report.ok()) throw NumericsError(failure_text(m, report));
-  check_result(loads.data, s.count * causes.size() * m.n_joints() * 6);
+  check_result(loads.data, s.count * causes.size() * m.n_loads() * 6);
   return loads.array;
 }
 
@@ -38,14 +38,15 @@ void bind_causes(nb::module_& m) {
       doc::text(
           R"(Joint loads that each cause alone makes; a joint load is linear in its causes.
 
-Every state is eliminated once and solved for each cause [rodriguez1987].)",
+Every state of a tree is eliminated once and solved for each cause [rodriguez1987].)",
           {R"(    causes: any of "gravity", "velocity", "drive" (tau), "motion" (prescribed), "passive" (the
         model's damping, friction, springs and stops), "external".
 )",
            doc::q_v_tau, doc::external, doc::prescribed,
            "    method: \"articulated_body\" or \"constraint_force\".\n"},
-          R"(    (..., causes, n_joints, 6) [N, N m], as of joint_loads. All six causes add up to the joint loads
-    under all of these together.)",
+          R"(    (..., causes, n_joints + n_loops, 6) [N, N m], as of joint_loads. All six causes add up to the
+    joint loads under all of these together. Loads that rigid bodies do not determine (see
+    indeterminacy) are split by the rule that chooses them, the least energy, so they add up too.)",
           R"(a cause is unknown, shapes do not fit the model, or a number is not finite.
     NumericsError: the method failed.)")
           .c_str());

@@ -107,7 +107,10 @@ void bind_forces(nb::module_& m) {
         doc::text(R"(Joint-space mass matrix H with H dv/dt + bias = tau, by composite rigid bodies
 [walker1982].)",
                   {doc::q},
-                  "    H (..., nv, nv) [kg m2, kg m, kg], symmetric, armatures on its diagonal.")
+                  "    H (..., nv, nv) [kg m2, kg m, kg], symmetric, armatures on its diagonal. It "
+                  "is that of the\n"
+                  "    tree: joints that close loops and couplings constrain the rates and leave H "
+                  "as it is.")
             .c_str());
   of_states(m, "passive_torque", &per_rate, &passive_torque,
             "Torque of the joints' own damping, friction, springs and compliant stops.",

@@ -62,8 +62,10 @@ GOOD = {
 CALLS = {
     "forward_dynamics": "*q *v tau:v external:wrenches passive:flag method solver tolerance stop "
     "max_iterations:count solver_options:options threads full:flag gravity:number",
-    "inverse_dynamics": "*q *v *acceleration:v external:wrenches gravity:number threads",
-    "inverse_dynamics_loads": "*q *v *acceleration:v external:wrenches gravity:number threads",
+    "inverse_dynamics": "*q *v *acceleration:v external:wrenches driven:joints passive:flag "
+    "gravity:number threads",
+    "inverse_dynamics_loads": "*q *v *acceleration:v external:wrenches driven:joints passive:flag "
+    "gravity:number threads",
     "joint_loads": "*q *v tau:v external:wrenches passive:flag method solver threads",
     "joint_loads_by_cause": "*causes *q *v tau:v external:wrenches method threads",
     "joint_poses": "*q threads",

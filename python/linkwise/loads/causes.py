@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from linkwise import _core
+from linkwise._core import InputError, NumericsError
 from linkwise.base import HALVES, Array, lengths
 from linkwise.io.complaint import check_one_of
 from linkwise.loads.extremes import (
@@ -28,6 +29,7 @@ from linkwise.loads.samples import (
     need_whole,
     rows,
 )
+from linkwise.notes import recorded_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,6 +57,8 @@ CAUSES: dict[str, dict[str, str]] = {
 }
 
 
+#: Part of the largest share that the sum may miss in machines with loops.
+_LOST = 1e-6
 _PASSIVE = ("damping", "friction", "stiffness", "limit_stiffness")
 
 
@@ -70,6 +74,12 @@ class Split:
         check_one_of("by", by, CAUSES)
         self.run, self.by = run, by
         machine = model_of(run, model)
+        self.closed = bool(machine.n_loops or machine.coupling_names)
+        if by == "motion" and self.closed:
+            raise InputError(
+                "by: how loads of closed loops split by motion depends on what drives them; "
+                'split them by "force"'
+            )
         wanted = ["joint_load", "position", "velocity"]
         wanted += ["drive_torque"] if by == "force" else ["acceleration"]
         self.given = given_motions(run)
@@ -95,13 +105,38 @@ class Split:
             return kinds is None or not set(kinds.values()) <= {"free", "locked", "motion"}
         if cause == "passive":
             free = ~self.imposed
+            if any(self.model.loop_nv):
+                return True
             return any(self.model.dof_property(name)[free].any() for name in _PASSIVE)
         if cause == "external":
             return "external_wrench" in self.run.dataset
         return "motion" in self.given.values()
 
     def shares(self, where: slice | Sequence[int]) -> Array:
-        """(time, cause, joint, 6) of these samples."""
+        """(time, cause, joint, 6) of these samples; NaN where loops close and the state tells too
+        little: in singular positions, and of springs in loop joints that turned more than once."""
+        if not self.closed:
+            return self._at(where)
+        count = self.run.dataset.sizes["time"]
+        chosen = list(range(count)[where]) if isinstance(where, slice) else list(where)
+        try:
+            shares = self._at(chosen)
+        except NumericsError:  # one state or more in a singular position: find out which
+            shares = np.concatenate([self._one(sample) for sample in chosen])
+        load = rows(self.run, "joint_load", chosen)
+        missed = np.abs(shares.sum(axis=1) - load).max(axis=(1, 2), initial=0.0)
+        largest = np.abs(shares).max(axis=(1, 2, 3), initial=0.0)
+        shares[~(missed <= _LOST * largest)] = np.nan
+        return shares
+
+    def _one(self, sample: int) -> Array:
+        try:
+            return self._at([sample])
+        except NumericsError:
+            size = self.model.n_joints + self.model.n_loops
+            return np.full((1, len(self.names), size, 6), np.nan)
+
+    def _at(self, where: slice | Sequence[int]) -> Array:
         q = rows(self.run, "position", where)
         v = rows(self.run, "velocity", where)
         a = None
@@ -186,7 +221,9 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
 
     Returns:
         DataArray (time, cause, joint, component), frame and signs as `joint_load`. Causes that the
-        run cannot have are left out. At the samples: the attribute `samples` says what these miss,
+        run cannot have are left out. Loads that rigid bodies do not determine (attribute
+        `undetermined`) are split by the rule that chose them. NaN where closed loops are in a
+        singular position. At the samples: the attribute `samples` says what these miss,
         and `split_at_peaks` is what the peaks are made of.
     """
     import xarray as xr
@@ -208,6 +245,7 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
             "long_name": f"joint load by {by}",
             **about,
             "samples": what_samples_miss(run),
+            **_undetermined(run),
         },
         name="joint_load",
     )
@@ -266,8 +304,14 @@ def split_at_peaks(run: RunLike, by: By = "force", model: Model | None = None) -
             "quantity": [name for name, _, _ in HALVES],
             "joint": ("joint", names),
         },
-        attrs={f"cause {name}": CAUSES[by][name] for name in made.names},
+        attrs={f"cause {name}": CAUSES[by][name] for name in made.names} | _undetermined(run),
     )
+
+
+def _undetermined(run: RunLike) -> dict[str, str]:
+    """What the run says of loads that rigid bodies do not determine: the same holds of shares."""
+    said = [w["text"] for w in recorded_warnings(run.dataset.attrs) if w["element"] == "joint_load"]
+    return {"undetermined": "; ".join(said)} if said else {}
 
 
 class _Last:

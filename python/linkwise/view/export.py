@@ -185,7 +185,7 @@ def _film(source: Source) -> Animation:
             loads[k, 0] = recording.load(sample)
     if causes:
         assert recording.causes is not None
-        loads[:] = recording.causes.shares(chosen)
+        loads[:] = recording.causes.shares(chosen)[:, :, : loads.shape[2]]
     return Animation(recording.times[chosen], poses, where, loads, causes)
 
 

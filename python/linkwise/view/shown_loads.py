@@ -13,6 +13,7 @@ from linkwise.io.complaint import shown
 from linkwise.loads.causes import CAUSES, Split
 from linkwise.loads.engineering import derive, joint_directions
 from linkwise.loads.rating import rating_table
+from linkwise.loads.samples import blocks
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -35,15 +36,24 @@ class CauseLoads:
         self.missing = ""
         try:
             self._split = Split(run, "force", model)
+            self._require_whole(run, 48 * (model.n_joints + model.n_loops) * len(CAUSES["force"]))
             self.names = list(self._split.names)
         except InputError as error:
             self.missing = str(error)
         self.chosen = set(self.names)
         self._count = run.dataset.sizes["time"]
-        size = 48 * model.n_joints * max(1, len(self.names))
+        size = 48 * (model.n_joints + model.n_loops) * max(1, len(self.names))
         self._rows = min(_MOST_BLOCK, rows_per_block(size))
         self._most = max(2, _MOST_IN_HISTORY // model.n_joints)
         self._first, self._shares = -1, np.zeros((0, 0, 0, 6))
+
+    def _require_whole(self, run: Run, row_bytes: int) -> None:
+        """Refuses runs of closed loops some of whose samples have no shares."""
+        for block in blocks(run, row_bytes) if self._split.closed else ():
+            if np.isnan(self._split.shares(block)).any():
+                raise InputError(
+                    "the machine passes a singular position, where its loads do not split"
+                )
 
     def choose(self, names: Sequence[str]) -> None:
         """Show these causes alone. Raises InputError where the run has no such cause."""

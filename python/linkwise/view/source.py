@@ -68,8 +68,7 @@ class Recording:
         self.peaks: Array = np.zeros(n_joints)
         self.causes: CauseLoads | None = None
         if loads:
-            if not model.n_loops and not model.coupling_names:  # which take no causes yet
-                self.causes = CauseLoads(run, model)
+            self.causes = CauseLoads(run, model)
             peaks = run.peak_loads()
             self.peaks = np.asarray(peaks["force"].values)
             self.largest = (float(peaks["force"].max()), float(peaks["moment"].max()))
@@ -112,7 +111,7 @@ class Recording:
     def load(self, sample: int) -> Array:
         """Loads (n_joints, 6) in the joint frames, of the chosen causes."""
         if self.causes is not None and not self.causes.everything:
-            return self.causes.load(sample)
+            return self.causes.load(sample)[: self.peaks.size]
         row = self._read(sample)
         return np.asarray(self._loads[row])
 
@@ -210,8 +209,6 @@ def _open_run(path: Path, options: Options) -> Source:
             appearance = Appearance([], [], [])
     recording = Recording(run, model, loads=options.loads)
     if options.causes:
-        if recording.causes is None and options.loads:
-            raise InputError("causes: machines with closed loops have none yet; leave them out")
         if recording.causes is None:
             raise InputError("causes: are those of loads, and --no-loads hides them; leave one out")
         recording.causes.choose(options.causes)

@@ -8,6 +8,7 @@
 #include "linkwise/base/memory.hpp"
 #include "linkwise/constraint/joint_constraint.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
+#include "linkwise/dynamics/driven_inverse.hpp"
 #include "linkwise/dynamics/parts.hpp"
 #include "linkwise/solve/direct/direct_solver.hpp"
 
@@ -82,6 +83,41 @@ void one_by_one(const Model& m, DynamicsMethod& method, size_t count, AppliedSta
     if (out.constraint_force)
       out.constraint_force->insert(out.constraint_force->end(), method.constraint_force().begin(),
                                    method.constraint_force().end());
+  }
+}
+
+/// Loads of each cause alone where loops close, state after state: the same method, given nothing
+/// but the cause. All choices that it makes, such as which dependent constraints carry a load,
+/// depend on the position alone, so the shares of all causes add up.
+void each_cause_alone(const Model& m, DynamicsMethod& method, size_t count,
+                      const BatchInput& states, std::span<const Cause> asked, double* loads,
+                      DynamicsReport& report, const GoOn& go_on) {
+  BatchInput driven = states, passive = states;
+  passive.tau = nullptr;
+  passive.passive_acts = std::find(asked.begin(), asked.end(), Cause::passive) != asked.end();
+  AppliedStates driven_states(m, count, driven), passive_states(m, count, passive);
+  const size_t width = 6 * static_cast<size_t>(m.n_loads());
+  const std::vector<double> none(m.nv());
+  std::vector<double> du(m.nv());
+  for (size_t i = 0; i < count && go_on(); ++i) {
+    const SweepInput<double> all = driven_states[i], yielding = passive_states[i];
+    for (const Cause cause : asked) {
+      SweepInput<double> in;
+      in.q = all.q;
+      in.v = cause == Cause::velocity ? all.v : none.data();
+      in.tau = cause == Cause::drive     ? all.tau
+               : cause == Cause::passive ? yielding.tau
+                                         : none.data();
+      if (cause == Cause::drive) in.loop_tau = all.loop_tau;
+      if (cause == Cause::passive) in.loop_tau = yielding.loop_tau;
+      if (cause == Cause::motion) in.prescribed = all.prescribed;
+      if (cause == Cause::external) in.external = all.external;
+      in.gravity_factor = cause == Cause::gravity ? all.gravity_factor : 0;
+      const DynamicsReport r = method.evaluate(0, in, du.data(), loads);
+      if (report.ok() && !r.ok()) report = r;
+      if (report.ok() && !rows_finite(loads, 0, 1, width)) report.outcome = Outcome::not_finite;
+      loads += width;
+    }
   }
 }
 
@@ -285,7 +321,16 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
                      "' does not split loads; use articulated_body or constraint_force");
   const bool by_force = method == "constraint_force";
   require_known_bodies(m, find_dynamics(method));
-  refuse_loops(m, "loads by cause");
+  if (m.is_constrained()) {
+    if (by_force) refuse_loops(m, "method constraint_force", "use method articulated_body");
+    DynamicsOptions options;
+    options.method = method;
+    DynamicsReport report;
+    Lease workspace(*this);
+    each_cause_alone(m, workspace->kept_method(options), count, states, causes, loads, report,
+                     go_on);
+    return evaluation_report(m, {method, "", ""}, report);
+  }
   if (by_force) require_regular_inertias(m);
   BatchInput s = states;
   std::vector<double> passive;
@@ -307,10 +352,16 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
   return evaluation_report(m, {method, "", ""}, report);
 }
 
-void Evaluator::inverse_dynamics(size_t count, const BatchInput& states, const Executor& executor,
-                                 double* tau, double* loads, const GoOn& go_on) const {
+EvaluationReport Evaluator::inverse_dynamics(size_t count, const BatchInput& states,
+                                             std::span<const std::string> driven,
+                                             const Executor& executor, double* tau, double* loads,
+                                             const GoOn& go_on) const {
   const Model& m = *model_;
-  refuse_loops(m, "inverse dynamics");
+  DynamicsReport report;
+  if (m.is_constrained() || !driven.empty()) {
+    driven_inverse(count, states, driven, tau, loads, report, go_on);
+    return evaluation_report(m, {"articulated_body", "", ""}, report);
+  }
   check_states(m, count, states);
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);
@@ -318,12 +369,33 @@ void Evaluator::inverse_dynamics(size_t count, const BatchInput& states, const E
                                       tau ? tau + first * m.nv() : nullptr,
                                       loads ? loads + first * 6 * m.n_joints() : nullptr);
   });
+  if (tau && states.passive_acts && m.has_passive_forces()) {
+    const std::vector<double> passive = with_passive_forces(m, count, states, nullptr);
+    for (size_t i = 0; i < passive.size(); ++i) tau[i] -= passive[i];
+  }
+  return evaluation_report(m, {}, report);
+}
+
+void Evaluator::driven_inverse(size_t count, const BatchInput& states,
+                               std::span<const std::string> driven, double* tau, double* loads,
+                               DynamicsReport& report, const GoOn& go_on) const {
+  const Model& m = *model_;
+  require_determined(m);
+  DrivenInverse kernel(m, driven);
+  BatchInput acting = states;
+  acting.tau = acting.du = nullptr;
+  AppliedStates applied(m, count, acting);
+  const std::vector<double> rest(m.nv());
+  const size_t nv = m.nv(), n_load = 6 * static_cast<size_t>(m.n_loads());
+  for (size_t i = 0; i < count && report.ok() && go_on(); ++i)
+    report = kernel.evaluate(applied[i], states.du ? states.du + i * nv : rest.data(),
+                             count > 1 ? "state " + std::to_string(i) + ": " : "",
+                             tau ? tau + i * nv : nullptr, loads ? loads + i * n_load : nullptr);
 }
 
 void Evaluator::mass_matrix(size_t count, const double* q, const Executor& executor, double* H,
                             const GoOn& go_on) const {
   const Model& m = *model_;
-  refuse_loops(m, "the mass matrix");
   const size_t nv = m.nv();
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);

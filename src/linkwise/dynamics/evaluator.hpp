@@ -65,17 +65,20 @@ class Evaluator {
                                     const DynamicsOptions& options, const ForwardOutput& out,
                                     const GoOn& go_on) const;
 
-  /// loads [count][causes][n_joints][6]; the method is articulated_body or constraint_force.
+  /// loads [count][causes][n_loads][6]; the method is articulated_body or constraint_force.
   EvaluationReport loads_by_cause(size_t count, const BatchInput& in, std::span<const Cause> causes,
                                   const std::string& method, const Executor& executor,
                                   double* loads, const GoOn& go_on) const;
 
-  /// tau [count][nv] and loads [count][n_joints][6] of the accelerations states.du; either may be
-  /// null.
-  void inverse_dynamics(size_t count, const BatchInput& in, const Executor& executor, double* tau,
-                        double* loads, const GoOn& go_on) const;
+  /// tau [count][nv] and loads [count][n_loads][6] of the accelerations states.du; either may be
+  /// null. With passive_acts tau is what the drives give beside the passive forces. driven: joints
+  /// that may have torques, none: all those of a tree. Machines with loops need some
+  /// (driven_inverse.hpp), one state after the other; of trees nothing fails but input.
+  EvaluationReport inverse_dynamics(size_t count, const BatchInput& in,
+                                    std::span<const std::string> driven, const Executor& executor,
+                                    double* tau, double* loads, const GoOn& go_on) const;
 
-  /// H [count][nv][nv].
+  /// H [count][nv][nv] of the tree; loops and couplings leave it as it is.
   void mass_matrix(size_t count, const double* q, const Executor& executor, double* H,
                    const GoOn& go_on) const;
 
@@ -85,6 +88,8 @@ class Evaluator {
   struct Pick;
   Pick pick(Workspace& workspace, size_t count, const DynamicsOptions& options, bool forces,
             Choice& choice) const;
+  void driven_inverse(size_t count, const BatchInput& states, std::span<const std::string> driven,
+                      double* tau, double* loads, DynamicsReport& report, const GoOn& go_on) const;
 
   const Model* model_;
   /// Workspaces that nobody uses. There is no lock: another thread's fork would keep it for ever.
