@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How often the stated bounds of peak loads hold, on a hundred and forty machines.
+"""How often the stated bounds of peak loads hold, on a hundred and fifty-eight machines.
 
     python tools/bounds_coverage.py [--tolerances 1e-4 1e-5 1e-6] [--kind NAME] [--json FILE]
 

@@ -175,6 +175,61 @@ def robots():
     return {name: functools.partial(_robot, files[name], free) for name, free in chosen.items()}
 
 
+def _published(name):
+    machine = lw.scenes.benchmark(name)
+    model = machine.model
+    if name == "slider_crank":  # which moves without weight and drive
+        model = model.with_payload(model.link_names[-1], mass=3.0, com=(0.05, 0.1, 0))
+    options = {"model": model, "q0": machine.q0, "v0": machine.v0}
+    return options | {"drives": machine.drives, "duration": 0.03 if name == "andrews" else 0.8}
+
+
+def _four_bar(rng, **properties):
+    """A crank-rocker in the plane z = 0, its last hinge the loop; properties of the rocker."""
+    builder = lw.ModelBuilder("four-bar", gravity=(0, -9.81, 0))
+    builder.add_link("base", mass=0)
+    lengths = {"crank": 0.4, "coupler": 1.2, "rocker": 0.9}
+    for link, size in lengths.items():
+        inertia = np.diag([0.01, 0.1, 0.1]) * rng.uniform(0.5, 2)
+        builder.add_link(link, mass=rng.uniform(0.5, 2), com=(size / 2, 0, 0), inertia=inertia)
+    z = {"axis": (0, 0, 1)}
+    builder.add_joint("a", "revolute", "base", "crank", **z)
+    builder.add_joint("b", "revolute", "crank", "coupler", translation=(0.4, 0, 0), **z)
+    rocker = {"translation": (1.1, 0, 0), **z}
+    builder.add_joint("d", "revolute", "base", "rocker", **rocker, **properties)
+    ends = {"translation": (1.2, 0, 0), "child_translation": (0.9, 0, 0)}
+    builder.add_loop("c", "revolute", "coupler", "rocker", **ends, **z)
+    closed = lw.assemble(builder.build(), [1.0, -0.3, 1.8], None)
+    return builder.build(), closed.q
+
+
+def _loops(rng):
+    kind = int(rng.integers(3))
+    stop = {"upper": 2.2, "lower": 1.2, "limit_stiffness": 10 ** rng.uniform(3, 6)}
+    model, q0 = _four_bar(rng, **({}, {"damping": 0.3, "stiffness": 5.0}, stop)[kind])
+    torque = rng.uniform(-8, 8)
+    return {
+        "model": model,
+        "q0": q0,
+        "duration": 0.8,
+        "drives": {"a": lambda t, q, v: torque * np.cos(4 * t) * np.ones(v.size)},
+    }
+
+
+def _coupled(rng):
+    arm_ = random_arm(rng, 4, damping=0.1)
+    model = arm_.with_coupling("gear", {"joint1": 1.0, "joint3": rng.uniform(-2, 2)})
+    return {**_swung(model, 20.0), "duration": 0.8}
+
+
+def _driven_loop(rng):
+    model, q0 = _four_bar(rng)
+    times = np.linspace(0, 0.8, 41)
+    turned = q0[0] + rng.uniform(0.3, 0.8) * np.sin(np.pi * times / 1.6) ** 2
+    crank = lw.Table(times, turned, "cubic")
+    return {"model": model, "q0": q0, "duration": 0.8, "drives": {"a": lw.Motion(crank)}}
+
+
 KINDS = {
     "known machines": _KNOWN,
     "random trees": drawn("tree", 25, functools.partial(_random_tree, floating=False)),
@@ -184,6 +239,13 @@ KINDS = {
     "tables and blows": drawn("table", 10, _table),
     "stiff drives": drawn("drives", 7, _stiff_drives),
     "given motions": drawn("motions", 5, _given_motions),
+    "published loops": {
+        name: functools.partial(_published, name)
+        for name in ("andrews", "bricard", "slider_crank", "stewart")
+    },
+    "four-bars, stops too": drawn("loops", 8, _loops),
+    "couplings": drawn("coupled", 4, _coupled),
+    "driven four-bars": drawn("driven", 2, _driven_loop),
 }
 SCENES = {name: scene for scenes in KINDS.values() for name, scene in scenes.items()}
 

@@ -117,24 +117,11 @@ class Split:
         little: in singular positions, and of springs in loop joints that turned more than once."""
         if not self.closed:
             return self._at(where)
-        count = self.run.dataset.sizes["time"]
-        chosen = list(range(count)[where]) if isinstance(where, slice) else list(where)
-        try:
-            shares = self._at(chosen)
-        except NumericsError:  # one state or more in a singular position: find out which
-            shares = np.concatenate([self._one(sample) for sample in chosen])
-        load = rows(self.run, "joint_load", chosen)
+        shares, load = self._at(where), rows(self.run, "joint_load", where)
         missed = np.abs(shares.sum(axis=1) - load).max(axis=(1, 2), initial=0.0)
         largest = np.abs(shares).max(axis=(1, 2, 3), initial=0.0)
         shares[~(missed <= _LOST * largest)] = np.nan
         return shares
-
-    def _one(self, sample: int) -> Array:
-        try:
-            return self._at([sample])
-        except NumericsError:
-            size = self.model.n_joints + self.model.n_loops
-            return np.full((1, len(self.names), size, 6), np.nan)
 
     def _at(self, where: slice | Sequence[int]) -> Array:
         q = rows(self.run, "position", where)
@@ -190,9 +177,7 @@ class Split:
             assert torque is not None
             driven = np.where(self.imposed, 0.0, torque)
             held = a if "motion" in self.names else None
-            return _core.joint_loads_by_cause(
-                self.free, self.names, q, v, driven, external=outside, prescribed=held
-            )
+            return self._by_force(q, [v, driven, outside, held])
         shares = np.empty((len(q), len(self.names), self.model.n_joints, 6))
         for k, cause in enumerate(self.names):
             shares[:, k] = _core.inverse_dynamics_loads(
@@ -204,6 +189,24 @@ class Split:
                 gravity=1.0 if cause == "gravity" else 0.0,
             )
         return shares
+
+    def _by_force(self, q: Array, acting: Sequence[Array | None]) -> Array:
+        """Of closed loops NaN at each state that is in a singular position."""
+        v, driven, outside, held = acting
+        try:
+            return _core.joint_loads_by_cause(
+                self.free, self.names, q, v, driven, external=outside, prescribed=held
+            )
+        except NumericsError:
+            if not self.closed:
+                raise
+            if len(q) == 1:
+                size = self.model.n_joints + self.model.n_loops
+                return np.full((1, len(self.names), size, 6), np.nan)
+        each = [slice(k, k + 1) for k in range(len(q))]
+        return np.concatenate(
+            [self._by_force(q[k], [x if x is None else x[k] for x in acting]) for k in each]
+        )
 
 
 @each_member

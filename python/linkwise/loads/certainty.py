@@ -56,22 +56,38 @@ def refined_loads(run: RunLike, model: Model, where: slice) -> Array:
     q, v = rows(run, "position", where), rows(run, "velocity", where)
     a = rows(run, "acceleration", where)
     outside = external(run, model, where)
+    given = list(given_motions(run))
+    free = model.prescribe(given) if given else model
+    if model.n_loops or model.coupling_names:
+        return _solved_again(
+            free, q, v, a if given else None, rows(run, "drive_torque", where), outside
+        )
     torque = rows(run, "drive_torque", where) + _core.passive_torque(model, q, v)
     residual = torque - _core.inverse_dynamics(model, q, v, a, external=outside)
     loads = _core.inverse_dynamics_loads(model, q, v, a, external=outside)
-    given = list(given_motions(run))
-    free = model.prescribe(given) if given else model
     for joint in given:
         residual[:, model.v_slice(joint)] = 0.0
     step = _core.forward_dynamics(free, q, None, residual, gravity=0.0, full=True)
     return np.asarray(loads + step.joint_load)
 
 
+def _solved_again(
+    free: Model, q: Array, v: Array, a: Array | None, torque: Array, outside: Array | None
+) -> Array:
+    """Loads of closed loops, of the recorded states: nothing iterates in their elimination."""
+    solved = _core.forward_dynamics(
+        free, q, v, torque, external=outside, passive=True, full=True, prescribed=a
+    )
+    if solved.report.outcome != "converged":  # in a singular position: not known
+        return np.full(solved.joint_load.shape, np.nan)
+    return np.asarray(solved.joint_load)
+
+
 def _algebraic(run: RunLike, model: Model, names: list[str]) -> Array:
     """Largest algebraic error over time (quantity, joint)."""
     directions = joint_directions(model)
-    worst = np.zeros((len(names), model.n_joints))
-    for where in blocks(run, 8 * 40 * model.n_joints):
+    worst = np.zeros((len(names), len(directions)))
+    for where in blocks(run, 8 * 40 * len(directions)):
         recorded = rows(run, "joint_load", where)
         refined = refined_loads(run, model, where)
         first, second = derive(recorded, directions), derive(refined, directions)
@@ -84,7 +100,9 @@ def _algebraic(run: RunLike, model: Model, names: list[str]) -> Array:
                 continue
             of = "force" if name in ("force", "axial", "radial") else "moment"
             floor = _ROUNDING * scale[of][:, None]
-            worst[k] = np.fmax(worst[k], (np.abs(first[name] - second[name]) + floor).max(axis=0))
+            worst[k] = np.maximum(
+                worst[k], (np.abs(first[name] - second[name]) + floor).max(axis=0)
+            )
     return worst
 
 
@@ -192,7 +210,8 @@ def bounds(run: RunLike, tighter: RunLike | None = None, model: Model | None = N
     Returns:
         Dataset over (quantity, joint), in the quantities' units: `algebraic`, `integration` and
         `plus_minus`, their sum; the last two are NaN without `tighter`, `algebraic` where the run
-        has an iterative solver whose errors are not bounded (`run.warnings` says so). Errors of the
+        has an iterative solver whose errors are not bounded (`run.warnings` says so), or closed
+        loops that pass a singular position. Errors of the
         model, of its data and of peaks that were not found (`sampling` of `summary`) are not in it.
     """
     import xarray as xr
