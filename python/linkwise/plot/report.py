@@ -34,7 +34,7 @@ body { font: 14px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 1200px; 
   color: #1a1a1a; background: #fff }
 h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2rem }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; width: 100% }
-td { white-space: nowrap }
+td { white-space: nowrap } .facts td:last-child { white-space: normal }
 th, td { padding: .2rem .6rem; text-align: right; border-bottom: 1px solid #ddd }
 th:first-child, td:first-child, .facts td, .named td:nth-child(2), .named th:nth-child(2) {
   text-align: left } .facts { width: auto } td small { display: block; color: #555 }

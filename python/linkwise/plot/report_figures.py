@@ -209,14 +209,14 @@ def _engineering(load: Array, direction: Array, half: int) -> Figure:
 def _thinned_shares(
     run: RunLike, model: Model, every: int, where: list[int]
 ) -> tuple[Array | None, list[str]]:
-    try:
+    parts = []
+    try:  # a run may lack what a split needs, or its machine have what a split does not take
         split = Split(run, "force", model)
+        for block in blocks(run, 8 * 60 * (model.n_joints + model.n_loops)):
+            keep = np.arange(block.start, block.stop) % every == 0
+            parts.append(split.shares(block)[keep][:, :, where])
     except InputError:
         return None, []
-    parts = []
-    for block in blocks(run, 8 * 60 * model.n_joints):
-        keep = np.arange(block.start, block.stop) % every == 0
-        parts.append(split.shares(block)[keep][:, :, where])
     return np.concatenate(parts), split.names
 
 

@@ -47,3 +47,18 @@ def test_every_option_has_its_figures(tmp_path):
     reader.feed((tmp_path / "r.html").read_text(encoding="utf-8"))
     assert reader.values == NAMES
     assert list(reader.figures["joints"]) == NAMES
+
+
+def test_loop_joints_have_figures_and_rows(tmp_path):
+    """Where causes are not to be had the other figures are."""
+    pytest.importorskip("plotly")
+    machine = lw.scenes.benchmark("slider_crank")
+    run = lw.simulate(machine.model, duration=0.05, q0=machine.q0, v0=machine.v0)
+    path = tmp_path / "report.html"
+    write_report(run, path, {"summary": summary(run)})
+    reader = Reader()
+    reader.feed(path.read_text(encoding="utf-8"))
+    assert reader.values == ["crank_pin", "knee", "guide", "wrist"]
+    titles = json.dumps([figure["layout"] for figure in reader.figures["joints"]["wrist"]])
+    assert "Force along and across the axis" in titles
+    assert "rigid bodies do not determine the loads of joints" in path.read_text(encoding="utf-8")
