@@ -113,9 +113,12 @@ def _show(found: dict[str, Any]) -> None:
             style=style,
         )
     screen.print(shown)
+    who: dict[str, dict[str, None]] = {}  # each message once, with all that it is about, in order
     for row in found["rows"]:
         if row["message"]:
-            screen.print(f"{row['solver'] or row['method']}: {text(row['message'])}", markup=False)
+            who.setdefault(row["message"], {})[row["solver"] or row["method"]] = None
+    for message, names in who.items():
+        screen.print(f"{', '.join(names)}: {text(message)}", markup=False)
     say_warnings(found["warnings"])
     if "plot" in found:
         screen.print(f"Chart: {found['plot']}", markup=False)

@@ -1,6 +1,7 @@
 """`linkwise compare`."""
 
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import pytest
 
@@ -95,3 +96,11 @@ def test_a_scenario_says_itself_how_its_model_is_loaded(linkwise, arm, tmp_path)
     result = linkwise("compare", "lift.toml", "--floating-base")
     assert result.code == 2
     assert "scenario" in result.complaint
+
+
+def test_of_closed_loops_each_reason_is_said_once(quick):
+    """All solvers of one method do not apply for one reason."""
+    result = quick(Path(__file__).parents[3] / "examples" / "data" / "watt.urdf")
+    assert result.code == 0
+    assert result.out.count("method constraint_force takes none") == 1
+    assert "thomas, twisted" in result.out
