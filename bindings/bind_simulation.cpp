@@ -161,6 +161,21 @@ void bind_drives(nb::class_<PySimulation>& simulation) {
            "breakpoints"_a = nb::none(), "samples"_a = nb::none());
 }
 
+void bind_doubts(nb::class_<PySimulation>& simulation) {
+  simulation
+      .def_prop_ro(
+          "stiffness", [](const PySimulation& s) { return s.simulation.stiffness(); },
+          "Since when the motion is stiff and what follows, one line; empty where nothing was "
+          "noticed.")
+      .def_prop_ro(
+          "force_doubt", [](const PySimulation& s) { return s.simulation.force_doubt(); },
+          "Where gains make too much force of the errors of steps, one line; empty: nowhere.")
+      .def_prop_ro(
+          "loop_doubt", [](const PySimulation& s) { return s.simulation.loop_doubt(); },
+          "Where loads of closed loops have no bound, one line; empty: nowhere.")
+      .def_prop_ro("knows_works", [](const PySimulation& s) { return s.simulation.knows_works(); });
+}
+
 }  // namespace
 
 void bind_simulation(nb::module_& m) {
@@ -197,16 +212,6 @@ void bind_simulation(nb::module_& m) {
           "interrupt", [](PySimulation& s) { s.simulation.stop(Outcome::interrupted); },
           "End what still runs.")
       .def_prop_ro("statistics", [](const PySimulation& s) { return s.simulation.statistics(); })
-      .def_prop_ro(
-          "stiffness", [](const PySimulation& s) { return s.simulation.stiffness(); },
-          "Since when the motion is stiff and what follows, one line; empty where nothing was "
-          "noticed.")
-      .def_prop_ro(
-          "force_doubt", [](const PySimulation& s) { return s.simulation.force_doubt(); },
-          "Where gains make too much force of the errors of steps, one line; empty: nowhere.")
-      .def_prop_ro(
-          "loop_doubt", [](const PySimulation& s) { return s.simulation.loop_doubt(); },
-          "Where loads of closed loops have no bound, one line; empty: nowhere.")
       .def(
           "keep_trace",
           [](PySimulation& s, bool wanted) {
@@ -235,6 +240,7 @@ void bind_simulation(nb::module_& m) {
       .def_prop_ro("reason",
                    [](const PySimulation& s) { return s.simulation.setup().choice.reason; });
   bind_drives(simulation);
+  bind_doubts(simulation);
   m.def("numerics", &numerics_list,
         "The options of Simulation, as dictionaries of name, default, units, kind (number, count, "
         "name) and description.");

@@ -124,7 +124,7 @@ kind = "torque"
 value = "3 N"
 [wrench.lower]
 force = [0, "1 N", 0]
-frame = "body"
+axes = "frame"
 [payload.box]
 link = "lower"
 mass = "2 kg"

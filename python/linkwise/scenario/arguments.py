@@ -304,9 +304,13 @@ class ArgumentBuilder:
         return result
 
     def _wrench(self, name: str, section: WrenchSection) -> drives.Wrench:
-        at = Frame(section.link or name, section.point, section.axes)
-        frame = section.frame or ("world" if section.axes is None else "body")
-        axes: drives.WrenchAxes = "frame" if frame == "body" else "world"
+        turned = None if isinstance(section.axes, str) else section.axes
+        at = Frame(section.link or name, section.point, turned)
+        axes: drives.WrenchAxes = "world"
+        if section.axes is not None:
+            axes = section.axes if isinstance(section.axes, str) else "frame"
+        elif section.frame == "body":
+            axes = "frame"
         if section.table is None:
             zero = [Quantity(0.0, None)] * 3
             parts = [*(section.force or zero), *(section.moment or zero)]

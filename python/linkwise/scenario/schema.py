@@ -215,18 +215,21 @@ Angles = Annotated[list[Annotated[float, _of("angle")]], Field(min_length=3, max
 class WrenchSection(_Tabled):
     """A force and moment at a point of a link, constant or from a table of six columns.
 
-    Where no link is given, the section's name is one. axes: roll, pitch, yaw against the link's.
+    Where no link is given, the section's name is one. axes: of the components, as in `Wrench`, or
+    roll, pitch, yaw of axes against the link's. frame: the former word.
     """
 
     link: str | None = None
     point: Point | None = None
-    axes: Angles | None = None
+    axes: Literal["world", "frame"] | Angles | None = None
     force: list[Scalar] | None = Field(default=None, min_length=3, max_length=3)
     moment: list[Scalar] | None = Field(default=None, min_length=3, max_length=3)
     frame: Literal["world", "body"] | None = None
 
     @model_validator(mode="after")
     def _one(self) -> WrenchSection:
+        if isinstance(self.axes, str) and self.frame is not None:
+            raise ValueError("has axes and frame, which is the former word for it; keep axes")
         if self.axes is not None and self.frame == "world":
             raise ValueError('has axes of its own and frame = "world"; keep one of them')
         self._check_table("force or moment", self.force is not None or self.moment is not None)

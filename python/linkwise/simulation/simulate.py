@@ -236,10 +236,18 @@ def _noticed(simulation: Simulation, ignored: Sequence[Ignored]) -> list[Ignored
     }
     if any(note.element == COARSE for note in ignored):
         said.pop("integrator")  # short steps have another reason
-    return [Ignored("", element, text) for element, text in said.items() if text]
+    noticed = [Ignored("", element, text) for element, text in said.items() if text]
+    if not simulation.knows_works:
+        noticed.append(Ignored("", "works", _UNKNOWN_WORKS))
+    return noticed
 
 
 COARSE = "solver_tolerance"
+_UNKNOWN_WORKS = (
+    "drive_work, external_work and dissipated_energy are not known from where they are NaN: what "
+    "holds a given motion could not be computed within a step; take shorter steps, or leave works "
+    "out"
+)
 
 
 def _coarse_solver(simulation: Simulation, options: Mapping[str, Any]) -> list[Ignored]:

@@ -82,6 +82,8 @@ class Simulation : private OdeSystem {
   double force_error(size_t member) const;
   /// Where loads of closed loops have no bound, one line; empty: nowhere.
   std::string loop_doubt() const;
+  /// Whether works were found, where they were asked for.
+  bool knows_works() const { return !work_ || work_->known(); }
   /// Ends what still runs.
   void stop(Outcome outcome) { end_all({outcome, integrator_->time(), "", describe(outcome)}); }
 

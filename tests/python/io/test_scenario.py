@@ -2,6 +2,7 @@
 
 import inspect
 import math
+import warnings
 from dataclasses import fields
 
 import numpy as np
@@ -92,7 +93,7 @@ def test_everything(write, arm):
         force = [0, "2 kN", 0]
         [wrench.upper]
         table = "hand.csv"
-        frame = "body"
+        axes = "frame"
         [simulate]
         duration = "0.5 min"
         tolerance = 1e-8
@@ -123,7 +124,7 @@ def test_everything(write, arm):
     np.testing.assert_array_equal(force.value.values, [[1], [2]])
     np.testing.assert_array_equal(given["wrenches"]["lower"].value, [0, 2000, 0, 0, 0, 0])
     wrench = given["wrenches"]["upper"]
-    assert wrench.frame == "body"
+    assert wrench.axes == "frame"
     np.testing.assert_array_equal(wrench.value.values[0], [1, 2, 3, 4, 5, 6])
     assert given["every"] == 0.01
     assert given["record"]["quantities"] == ["joint_load", "energy"]
@@ -523,3 +524,36 @@ def test_options_are_those_of_the_core(write):
         "step": "s",
         "max_step": "s",
     }
+
+
+WRENCH = """
+[model.chain]
+n_bodies = 2
+[wrench.link_2]
+force = [1, 0, 0]
+{}
+[simulate]
+duration = 0.1
+"""
+
+
+@pytest.mark.parametrize(("former", "now"), [("world", "world"), ("body", "frame")])
+def test_the_former_word_for_axes_is_read_and_told(tmp_path, former, now):
+    """Both words mean one thing, and three angles are axes of their own."""
+    path = tmp_path / "case.toml"
+
+    def wrench(line):
+        path.write_text(WRENCH.format(line))
+        scenario = load_scenario(path)
+        return scenario.simulate_arguments(scenario.load_model())["wrenches"]["link_2"]
+
+    with pytest.warns(UserWarning, match=f'wrench.link_2: frame is now axes; write axes = "{now}"'):
+        old = wrench(f'frame = "{former}"')
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        new, turned, plain = (wrench(x) for x in (f'axes = "{now}"', "axes = [0, 0, 1]", ""))
+    assert old.axes == new.axes == now
+    assert (turned.axes, plain.axes) == ("frame", "world")
+    assert turned.at.axes[0, 0] == pytest.approx(math.cos(1))
+    with pytest.raises(lw.InputError, match="keep axes"):
+        wrench(f'axes = "{now}"\nframe = "{former}"')

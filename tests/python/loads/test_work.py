@@ -192,3 +192,26 @@ def test_a_work_that_is_no_number_ends_the_simulation():
     assert "dissipated_energy is not finite" in run.message
     for name in WORKS:
         assert np.isfinite(run[name].values).all(), name
+
+
+def test_a_run_says_that_works_are_not_known():
+    """A torque is finite at the stages of the steps, where it was asked, and huge between them."""
+    step = 0.01
+
+    def torque(t, q, v):
+        stage = t / (step / 2)
+        return 1.0 if abs(stage - round(stage)) < 1e-6 else 1.7e308
+
+    moved = lw.Motion(lambda t: (np.sin(t), np.cos(t), -np.sin(t)), breakpoints=[])
+    run = lw.simulate(
+        lw.scenes.chain(2),
+        duration=0.1,
+        every=0.05,
+        integrator="runge_kutta_4",
+        step=step,
+        drives={"joint_1": moved, "joint_2": lw.Torque(torque, breakpoints=[])},
+    )
+    assert run.completed
+    assert np.isnan(run.drive_work.values[1:]).all()
+    (note,) = [note for note in run.warnings if note["element"] == "works"]
+    assert "not known" in note["text"]
