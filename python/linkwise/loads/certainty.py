@@ -50,6 +50,21 @@ STEPS_SHARE = 0.1
 # Rounding of the wrench recursion, relative to the largest load of the sample.
 _ROUNDING = 64 * np.finfo(np.float64).eps
 
+#: Directions that loop joints hold. The search for undetermined loads is dense: about a second
+#: for so many.
+MOST_ROWS = 1000
+#: Cosines below this, or above one less this, are across an axis, or along it.
+_ALIGNED = 1e-9
+#: Which half of a load a quantity is of, and which part of it, seen along the joint's axis.
+_PARTS = {
+    "force": (0, "whole"),
+    "axial": (0, "along"),
+    "radial": (0, "across"),
+    "moment": (1, "whole"),
+    "torque": (1, "along"),
+    "tilting_moment": (1, "across"),
+}
+
 
 def refined_loads(run: RunLike, model: Model, where: slice) -> Array:
     """Joint loads (time, joint, 6) after one step of refinement of the recorded accelerations."""
@@ -104,6 +119,34 @@ def _algebraic(run: RunLike, model: Model, names: list[str]) -> Array:
                 worst[k], (np.abs(first[name] - second[name]) + floor).max(axis=0)
             )
     return worst
+
+
+def _undetermined(run: RunLike, model: Model, names: list[str]) -> AnyArray:
+    """Which quantities (quantity, joint) hold components that rigid bodies do not determine at the
+    start or in the middle of the run."""
+    directions = joint_directions(model)
+    found = np.zeros((len(names), len(directions)), dtype=bool)
+    if not model.n_loops and not model.coupling_names:
+        return found
+    if sum(6 - freedom for freedom in model.loop_nv) + len(model.coupling_names) > MOST_ROWS:
+        return ~found
+    given = list(given_motions(run))
+    held = model.prescribe(given) if given else model
+    middle = run.dataset.sizes["time"] // 2
+    masks = [
+        np.asarray(_core.indeterminacy(held, q).determinate, dtype=bool)
+        for q in rows(run, "position", [0, middle])
+    ]
+    free = ~np.all(masks, axis=0).reshape(-1, 2, 3)
+    along = np.abs(directions)
+    for k, name in enumerate(names):
+        if name not in _PARTS:
+            continue
+        half, part = _PARTS[name]
+        whole = np.ones_like(along, dtype=bool)
+        taken = {"whole": whole, "along": along > _ALIGNED, "across": along < 1 - _ALIGNED}[part]
+        found[k] = (free[:, half] & taken).any(axis=-1)
+    return found
 
 
 def _step_tolerance(run: RunLike) -> float:
@@ -211,8 +254,9 @@ def bounds(run: RunLike, tighter: RunLike | None = None, model: Model | None = N
         Dataset over (quantity, joint), in the quantities' units: `algebraic`, `integration` and
         `plus_minus`, their sum; the last two are NaN without `tighter`, `algebraic` where the run
         has an iterative solver whose errors are not bounded (`run.warnings` says so), or closed
-        loops that pass a singular position. Errors of the
-        model, of its data and of peaks that were not found (`sampling` of `summary`) are not in it.
+        loops that pass a singular position, or rigid bodies do not determine the load. Errors of
+        the model, of its data and of peaks that were not found (`sampling` of `summary`) are not
+        in it.
     """
     import xarray as xr
 
@@ -222,7 +266,8 @@ def bounds(run: RunLike, tighter: RunLike | None = None, model: Model | None = N
     peaks = summary(run, machine)
     names = [str(name) for name in peaks["quantity"].values]
     absent = np.isnan(peaks["peak"].values)
-    unknown = absent | (run.dataset.attrs.get("solver_error") == "not bounded")
+    unknown = absent | _undetermined(run, machine, names)
+    unknown |= np.full_like(absent, run.dataset.attrs.get("solver_error") == "not bounded")
     algebraic = np.where(unknown, np.nan, _algebraic(run, machine, names))
     integration = np.full_like(algebraic, np.nan)
     if tighter is not None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from linkwise import _core
 from linkwise.base import COMPONENTS
+from linkwise.loads.certainty import MOST_ROWS
 from linkwise.notes import Ignored
 
 if TYPE_CHECKING:
@@ -13,8 +14,6 @@ if TYPE_CHECKING:
 
     from linkwise._core import Model
 
-#: Directions that loop joints hold. The search is dense: about a second for so many.
-MOST_ROWS = 1000
 _MOST_NAMED = 8
 _ELEMENT = "joint_load"
 

@@ -107,6 +107,21 @@ def test_a_run_of_loops_is_split():
         lw.loads.split(run, "motion")
 
 
+def test_what_rigid_bodies_do_not_determine_has_no_bound():
+    """Hinges along z of a planar row hold fz, nx and ny over and over; fx and fy are determined."""
+    machine = lw.scenes.benchmark("four_bars")
+    options = {"duration": 0.3, "every": 0.1, "q0": machine.q0, "v0": machine.v0}
+    runs = [lw.simulate(machine.model, tolerance=t, **options) for t in (1e-6, 1e-8)]
+    bound = lw.loads.bounds(*runs).plus_minus
+    for name in ("force", "axial", "moment", "tilting_moment"):
+        assert np.isnan(bound.sel(quantity=name)).all(), name
+    assert np.isfinite(bound.sel(quantity=["radial", "torque"])).all()
+    ball = lw.scenes.benchmark("stewart")
+    options |= {"q0": ball.q0, "v0": ball.v0}
+    runs = [lw.simulate(ball.model, tolerance=t, **options) for t in (1e-6, 1e-8)]
+    assert np.isfinite(lw.loads.bounds(*runs).plus_minus.sel(quantity=["force", "moment"])).all()
+
+
 def test_a_singular_position_has_no_shares():
     """Where a linkage is stretched straight its state does not say how the loads split: NaN."""
     machine = lw.scenes.benchmark("four_bars")
