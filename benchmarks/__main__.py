@@ -11,6 +11,7 @@ STUDIES = (
     "peers",
     "instructions",
     "many_simulations",
+    "looped_robots",
     "huge_chains",
     "million_links",
     "iterations",

@@ -145,3 +145,43 @@ duration = 0.1
     model = scenario.load_model()
     alone = lw.simulate(model, **scenario.simulate_arguments(model))
     assert np.array_equal(found.joint_load.values[0], alone.joint_load.values)
+
+
+def states_along_a_motion(machine, count: int) -> tuple[np.ndarray, np.ndarray]:
+    run = lw.simulate(
+        machine.model,
+        q0=machine.q0,
+        v0=machine.v0,
+        drives=machine.drives,
+        times=np.linspace(0, 0.1, count),
+        record=["position", "velocity"],
+    )
+    return run.position.values, run.velocity.values
+
+
+@pytest.mark.parametrize("name", ["stewart", "bricard"])
+def test_threads_share_states_and_change_no_bit(name):
+    machine = benchmark(name)
+    q, v = states_along_a_motion(machine, 50)
+    q, v = np.tile(q, (40, 1)), np.tile(v, (40, 1))  # enough for several threads
+    tau = np.random.default_rng(1).standard_normal(v.shape)
+    one = lw.forward_dynamics(machine.model, q, v, tau, full=True, threads=1)
+    for threads in (2, 3, 8):
+        many = lw.forward_dynamics(machine.model, q, v, tau, full=True, threads=threads)
+        assert np.array_equal(one.acceleration, many.acceleration)
+        assert np.array_equal(one.joint_load, many.joint_load)
+        loads = lw.joint_loads(machine.model, q, v, tau, threads=threads)
+        assert np.array_equal(one.joint_load, loads)
+    for k in (0, 777, len(q) - 1):
+        alone = lw.forward_dynamics(machine.model, q[k], v[k], tau[k], full=True)
+        assert np.array_equal(one.acceleration[k], alone.acceleration)
+        assert np.array_equal(one.joint_load[k], alone.joint_load)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 8])
+def test_the_first_state_that_leaves_a_loop_open_is_named(threads):
+    machine = benchmark("bricard")
+    q = np.tile(machine.q0, (3000, 1))
+    q[[1234, 2900]] += 0.1
+    with pytest.raises(lw.InputError, match=r"^state 1234: "):
+        lw.forward_dynamics(machine.model, q, np.zeros_like(q), threads=threads)

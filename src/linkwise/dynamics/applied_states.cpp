@@ -36,12 +36,16 @@ std::vector<double> with_passive_forces(const Model& m, size_t count, const Batc
 /// What joints that close loops add to a state's input. InputError where it leaves one open.
 class AppliedStates::Loops {
  public:
-  Loops(const Model& model, const BatchInput& s, size_t count)
-      : model_(model), states_(model), passive_(s.passive_acts), several_(count > 1) {}
+  Loops(const Model& model, const BatchInput& s, size_t count, size_t first)
+      : model_(model),
+        states_(model),
+        passive_(s.passive_acts),
+        several_(first + count > 1),
+        first_(first) {}
 
   void add(size_t i, SweepInput<double>& in) {
     states_.update(in);
-    const std::string where = several_ ? "state " + std::to_string(i) + ": " : "";
+    const std::string where = several_ ? "state " + std::to_string(first_ + i) + ": " : "";
     require_closed(model_, states_, where);
     require_coupled(model_, in.q, in.v, where);
     if (!passive_) return;
@@ -54,10 +58,12 @@ class AppliedStates::Loops {
   const Model& model_;
   LoopStates states_;
   bool passive_, several_;
+  size_t first_;
   std::vector<double> tau_;
 };
 
-AppliedStates::AppliedStates(const Model& model, size_t count, const BatchInput& states)
+AppliedStates::AppliedStates(const Model& model, size_t count, const BatchInput& states,
+                             size_t first)
     : model_(&model), rows_(states), rest_(states.v ? 0 : model.nv()) {
   check_states(model, count, states);
   if (states.passive_acts && model.has_passive_forces())
@@ -65,7 +71,7 @@ AppliedStates::AppliedStates(const Model& model, size_t count, const BatchInput&
   else if (!states.tau)
     torques_.assign(count * model.nv(), 0.0);
   if (!torques_.empty()) rows_.tau = torques_.data();
-  if (model.is_constrained()) loops_ = std::make_unique<Loops>(model, states, count);
+  if (model.is_constrained()) loops_ = std::make_unique<Loops>(model, states, count, first);
 }
 
 AppliedStates::~AppliedStates() = default;

@@ -20,7 +20,8 @@ std::vector<double> with_passive_forces(const Model& model, size_t count, const 
 /// where they act. The arrays of `states` must outlive it. InputError as check_states().
 class AppliedStates {
  public:
-  AppliedStates(const Model& model, size_t count, const BatchInput& states);
+  /// first: what states are counted from where one is told.
+  AppliedStates(const Model& model, size_t count, const BatchInput& states, size_t first = 0);
   ~AppliedStates();
   AppliedStates(const AppliedStates&) = delete;
   AppliedStates& operator=(const AppliedStates&) = delete;

@@ -121,6 +121,19 @@ void each_cause_alone(const Model& m, DynamicsMethod& method, size_t count,
   }
 }
 
+/// What parts of the states report, in their order, as one_by_one() does of them all.
+void add_part(DynamicsReport& report, const DynamicsReport& part) {
+  report.loops = part.loops;
+  if (part.ok() || (part.outcome == Outcome::not_finite && !report.ok())) return;
+  report.outcome = part.outcome;
+  if (part.body >= 0) report.body = part.body;
+}
+
+ForwardOutput from_state(const Model& m, const ForwardOutput& out, size_t first) {
+  return {out.acceleration + first * m.nv(),
+          out.joint_load ? out.joint_load + first * 6 * m.n_loads() : nullptr, nullptr};
+}
+
 }  // namespace
 
 DynamicsOptions evaluation_options() {
@@ -274,6 +287,34 @@ Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const Dynami
   return picked;
 }
 
+/// States of machines with loops share no lanes, but threads.
+DynamicsReport Evaluator::over_threads(size_t count, const BatchInput& states,
+                                       const DynamicsOptions& options, const ForwardOutput& out,
+                                       const GoOn& go_on) const {
+  const Model& m = *model_;
+  struct Part {
+    DynamicsReport report;
+    std::string wrong;
+  };
+  std::vector<Part> parts(count);  // each at its first state
+  for_each_part(m, count, options.executor, go_on, [&](size_t first, size_t n) {
+    try {
+      Lease own(*this);
+      AppliedStates applied(m, n, states.from(m, first), first);
+      one_by_one(m, own->kept_method(options), n, applied, from_state(m, out, first),
+                 parts[first].report, go_on);
+    } catch (const InputError& error) {
+      parts[first].wrong = error.what();
+    }
+  });
+  DynamicsReport report;
+  for (const Part& part : parts) {
+    if (!part.wrong.empty()) throw InputError(part.wrong);
+    add_part(report, part.report);
+  }
+  return report;
+}
+
 EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& states,
                                              const DynamicsOptions& options,
                                              const ForwardOutput& out, const GoOn& go_on) const {
@@ -281,6 +322,13 @@ EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& sta
   check_prescribed(m, states);
   require_determined(m);
   check_room(m, count, states, out);
+  const bool plain = options.method == "auto" || options.method == "articulated_body";
+  if (count > 1 && m.is_constrained() && plain && options.solver == "auto" &&
+      !out.constraint_force) {
+    check_states(m, count, states);
+    return evaluation_report(m, {"articulated_body", "", ""},
+                             over_threads(count, states, options, out, go_on));
+  }
   AppliedStates applied(m, count, states);
   const BatchInput& s = applied.rows();
   DynamicsReport report;

@@ -4,8 +4,8 @@
 // there are:
 //     one state     the method of the table that "auto" stands for: split into pieces, paths or
 //                   branches where the machine is large enough, plain otherwise
-//     many states   articulated_body, or constraint_force with thomas, on SIMD lanes; every other
-//                   method state by state
+//     many states   articulated_body, or constraint_force with thomas, on SIMD lanes; machines with
+//                   loops one state in each thread; every other method state by state
 #include <array>
 #include <atomic>
 #include <memory>
@@ -90,6 +90,9 @@ class Evaluator {
             Choice& choice) const;
   void driven_inverse(size_t count, const BatchInput& states, std::span<const std::string> driven,
                       double* tau, double* loads, DynamicsReport& report, const GoOn& go_on) const;
+  DynamicsReport over_threads(size_t count, const BatchInput& states,
+                              const DynamicsOptions& options, const ForwardOutput& out,
+                              const GoOn& go_on) const;
 
   const Model* model_;
   /// Workspaces that nobody uses. There is no lock: another thread's fork would keep it for ever.

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "dynamics/dynamics_case.hpp"
+#include "dynamics/looped_machine.hpp"
 #include "linkwise/dynamics/evaluator.hpp"
 #include "linkwise/dynamics/inverse_dynamics.hpp"
 #include "linkwise/simd/lanes.hpp"
@@ -241,6 +242,36 @@ TEST(Evaluator, StopsBetweenPartsWhenItIsAskedTo) {
                                 [&] { return ++asked < 3; });
   EXPECT_NE(du[m.nv()], -7);
   EXPECT_EQ(du[2 * m.nv()], -7);
+}
+
+// States of machines with loops are dealt out over threads, and a wrong one is told by its number.
+TEST(Evaluator, ThreadsShareStatesWithLoops) {
+  const Model m{row_of_four_bars(2)};
+  constexpr size_t count = 400;
+  std::vector<double> q(count * m.nq()), v(count * m.nv());
+  std::vector<double> du(count * m.nv()), loads(count * 6 * m.n_loads());
+  const BatchInput in{q.data(), v.data()};
+  DynamicsOptions options = asking_for("auto");
+  const auto evaluate = [&](int threads) {
+    options.executor = Executor(threads);
+    return Evaluator(m).forward_dynamics(count, in, options, {du.data(), loads.data()}, go_on);
+  };
+  const EvaluationReport report = evaluate(1);
+  EXPECT_TRUE(report.ok());
+  EXPECT_EQ(report.choice.method, "articulated_body");
+  const std::vector<double> first = du, first_loads = loads;
+  EXPECT_NE(first[0], 0);
+  du.assign(du.size(), NAN);
+  EXPECT_TRUE(evaluate(3).ok());
+  EXPECT_EQ(du, first);
+  EXPECT_EQ(loads, first_loads);
+  q[123 * m.nq()] = q[321 * m.nq()] = 0.1;
+  try {
+    evaluate(3);
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()).find("state 123: "), 0u) << error.what();
+  }
 }
 
 }  // namespace
