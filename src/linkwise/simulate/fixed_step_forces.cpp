@@ -124,7 +124,7 @@ void FixedStepForces::judge(Row& row, double h) {
     return made + brought_to_rest * std::sqrt(inertia) + of_blow(row, begins, h, inertia);
   };
   double error = whole(row.inertia);
-  if ((K > 0 && row.inertia == 0) || error > growth * row.error) {
+  if (row.inertia == 0 ? K > 0 || error > 0 : K > 0 && error > growth * row.error) {
     row.inertia = inertia(row);
     error = whole(row.inertia);
   }
