@@ -236,7 +236,14 @@ def peak_records(found: dict[str, Any], joints: list[str] | None) -> list[dict[s
             if math.isnan(columns["peak"][k, j]):  # no single axis
                 continue
             record: dict[str, Any] = {"joint": name, "quantity": quantity, "unit": units[k]}
-            records.append(record | {key: float(values[k, j]) for key, values in columns.items()})
+            record |= {key: float(values[k, j]) for key, values in columns.items()}
+            if "determinate" in summary:
+                record["determinate"] = bool(summary["determinate"].values[k, j])
+                known = summary["wrench_determinate"].values[j]
+                record["not_determinate"] = " ".join(
+                    c for c, one in zip(components, known, strict=True) if not one
+                )
+            records.append(record)
     return records
 
 
@@ -269,7 +276,7 @@ def _with_bound(record: dict[str, Any]) -> str:
     shown = number(record["peak"])
     if math.isfinite(record.get("plus_minus", math.nan)):
         shown += f" ± {number(record['plus_minus'], 1)}"
-    return shown
+    return shown if record.get("determinate", True) else f"({shown})"
 
 
 def tables(
@@ -289,6 +296,19 @@ def tables(
     return made
 
 
+def _bracketed(records: list[dict[str, Any]]) -> str:
+    """What brackets mean, where there are any."""
+    if all(record.get("determinate", True) for record in records):
+        return ""
+    return "; in brackets: not determined by rigid bodies, one choice of many"
+
+
+def _by_force(item: tuple[str, dict[str, dict[str, Any]]]) -> tuple[bool, float]:
+    """Large forces first, and what is one choice of many behind all others."""
+    force = item[1]["force"]
+    return not force.get("determinate", True), -force["peak"]
+
+
 def _all_joints(records: list[dict[str, Any]], some: str) -> Any:
     by_joint: dict[str, dict[str, dict[str, Any]]] = {}
     for record in records:
@@ -297,10 +317,11 @@ def _all_joints(records: list[dict[str, Any]], some: str) -> Any:
     title = f"Peak joint loads{some}, inboard on outboard body"
     title += ", in the joint frame at the joint point"
     if len(rows) > _MOST_JOINTS:
-        rows = sorted(rows, key=lambda item: -item[1]["force"]["peak"])[:_MOST_JOINTS]
+        rows = sorted(rows, key=_by_force)[:_MOST_JOINTS]
         title += f" (the {_MOST_JOINTS} largest forces of {len(by_joint)} joints)"
     shown = [name for name in _SHOWN if any(name in found for _, found in rows)]
     units = {r["quantity"]: r["unit"] for r in records}
+    title += _bracketed(records)
     headings = [(f"{name.replace('_', ' ')} [{units[name]}] @ s", "right") for name in shown]
     result = table(title, [("joint", "left"), *headings])
     for name, found in rows:
@@ -320,6 +341,7 @@ def _joint_table(records: list[dict[str, Any]], joint: str, some: str) -> Any:
     headings = ["peak", "at [s]", "rms", "minimum", "maximum", "duty", *COMPONENTS]
     columns = [("quantity", "left"), *((name, "right") for name in headings)]
     title = f"Load of {text(joint)}{some}; fx ... nz at the time of each peak"
+    title += _bracketed([record for record in records if record["joint"] == joint])
     result = table(f"{title}, rms and duty of the samples", columns)
     for record in records:
         if record["joint"] != joint:
@@ -328,25 +350,38 @@ def _joint_table(records: list[dict[str, Any]], joint: str, some: str) -> Any:
         result.add_row(
             f"{record['quantity'].replace('_', ' ')} [{record['unit']}]",
             _with_bound(record),
-            *(number(record[key]) for key in keys),
+            *(_or_bracketed(record, key) for key in keys),
         )
     return result
+
+
+def _or_bracketed(record: dict[str, Any], key: str) -> str:
+    shown = number(record[key])
+    if key in record.get("not_determinate", "").split():
+        return f"({shown})"
+    of_quantity = key in ("rms", "minimum", "maximum", "duty")
+    return f"({shown})" if of_quantity and not record.get("determinate", True) else shown
+
+
+def _of_rating(record: dict[str, Any]) -> list[str]:
+    return [f"{100 * record['use']:.1f} %", f"{100 * record['margin']:.1f} %"]
 
 
 def _margin_table(rated: list[dict[str, Any]]) -> Any:
     headings = [("joint", "left"), ("quantity", "left")]
     headings += [(name, "right") for name in ("peak", "at [s]", "rating", "use", "margin")]
-    result = table("Against the ratings; the bounds of certified peaks count as load", headings)
-    for record in sorted(rated, key=lambda r: -r["use"]):
+    title = "Against the ratings; the bounds of certified peaks count as load"
+    result = table(title + _bracketed(rated), headings)
+    for record in sorted(rated, key=lambda r: (not r.get("determinate", True), -r["use"])):
         style = "red" if record["margin"] < 0 else ""
+        known = record.get("determinate", True)
         result.add_row(
             text(record["joint"]),
             f"{record['quantity'].replace('_', ' ')} [{record['unit']}]",
             _with_bound(record),
             number(record["peak_time"]),
             number(record["rating"]),
-            f"{100 * record['use']:.1f} %",
-            f"{100 * record['margin']:.1f} %",
+            *((x if known else f"({x})") for x in _of_rating(record)),
             style=style,
         )
     return result

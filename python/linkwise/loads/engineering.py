@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from linkwise.base import DERIVED, Array, lengths
+from linkwise.base import DERIVED, AnyArray, Array, lengths
 from linkwise.loads.extremes import what_samples_miss
 from linkwise.loads.members import each_member
 from linkwise.loads.samples import Selection, joint_names, model_of, need, rows, select
+from linkwise.record.schema import DETERMINATE
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
     from linkwise.loads.samples import RunLike
+
+
+# Components of a unit vector that are less are rounding.
+_ALONG = 1e-9
 
 
 class Quantity(NamedTuple):
@@ -93,6 +99,35 @@ def derive(load: Array, directions: Array) -> dict[str, Array]:
         "tilting_moment": lengths(moment - torque[..., None] * directions),
         "torque": torque,
     }
+
+
+def determinate_quantities(
+    run: RunLike, directions: Array, names: Sequence[str]
+) -> AnyArray | None:
+    """Whether rigid bodies determine the quantities, (quantity, joint), for axes (joint, 3).
+
+    One is open where a component that it is made of is. None where the run does not tell.
+    """
+    if DETERMINATE not in run.dataset:
+        return None
+    is_open = ~run.dataset[DETERMINATE].values.reshape(-1, 2, 3)
+    along = (np.abs(directions) > _ALONG) | np.isnan(directions)
+    across = (np.abs(directions) < 1 - _ALONG) | np.isnan(directions)
+    parts = {"": np.ones_like(along), "along": along, "across": across}
+    made_of = {
+        "force": (0, ""),
+        "axial": (0, "along"),
+        "radial": (0, "across"),
+        "moment": (1, ""),
+        "tilting_moment": (1, "across"),
+        "torque": (1, "along"),
+    }
+    known = np.ones((len(names), len(is_open)), dtype=np.bool_)
+    for k, name in enumerate(names):
+        if name in made_of:  # the power of a drive is that of its torque, which is given
+            half, part = made_of[name]
+            known[k] = ~(is_open[:, half] & parts[part]).any(axis=1)
+    return known
 
 
 def has_power(run: RunLike) -> bool:

@@ -26,6 +26,7 @@ from linkwise.loads.samples import (
     select,
     trapezoid_weights,
 )
+from linkwise.record.schema import DETERMINATE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -169,7 +170,8 @@ def damage_equivalent(
 
     Returns:
         DataArray (exponent, joint, component), peak to peak, N and N m. Cycles are those of
-        `cycles`.
+        `cycles`. Of machines with loops the coordinate `determinate` (joint, component) says which
+        of them rigid bodies determine.
     """
     import xarray as xr
 
@@ -197,6 +199,10 @@ def damage_equivalent(
             for k, m in enumerate(slopes):
                 found[k, j, c] = equivalent(counted[:, 0], counted[:, 2], float(m), count)
     given = run.dataset["joint_load"]
+    known = {}
+    if DETERMINATE in run.dataset:
+        mask = run.dataset[DETERMINATE].values[where]
+        known = {DETERMINATE: (("joint", "component"), mask)}
     return xr.DataArray(
         found,
         dims=("exponent", "joint", "component"),
@@ -204,6 +210,7 @@ def damage_equivalent(
             "exponent": slopes.tolist(),
             "joint": names,
             "component": given["component"],
+            **known,
         },
         attrs={
             **given.attrs,

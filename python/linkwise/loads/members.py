@@ -13,6 +13,7 @@ import numpy as np
 
 from linkwise._core import InputError, Model
 from linkwise.base import AnyArray
+from linkwise.record.schema import DETERMINATE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,6 +22,11 @@ if TYPE_CHECKING:
 
 P = ParamSpec("P")
 T = TypeVar("T")
+#: Booleans, false where a member has no samples.
+_MASKS = (
+    DETERMINATE,
+    *(f"{name}_{DETERMINATE}" for name in ("wrench", "force", "moment")),
+)
 _MOST_TEXTS = 3  # of attributes in which members differ
 
 
@@ -139,7 +145,9 @@ def _along(
     )
     if len(found) == dataset.sizes[dim]:
         return joined
-    return joined.assign_coords({dim: list(found)}).reindex({dim: range(dataset.sizes[dim])})
+    return joined.assign_coords({dim: list(found)}).reindex(
+        {dim: range(dataset.sizes[dim])}, fill_value=dict.fromkeys(_MASKS, False)
+    )
 
 
 def _of_one(

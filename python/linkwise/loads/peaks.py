@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.base import HALVES, Array, lengths
-from linkwise.loads.engineering import QUANTITIES, derived_rows, has_power, joint_directions
+from linkwise.loads.engineering import (
+    QUANTITIES,
+    derived_rows,
+    determinate_quantities,
+    has_power,
+    joint_directions,
+)
 from linkwise.loads.extremes import Extremes, extremes_of, load_at_extremes, quantity_rows
 from linkwise.loads.members import each_member
 from linkwise.loads.samples import (
@@ -20,6 +26,7 @@ from linkwise.loads.samples import (
     trapezoid_weights,
 )
 from linkwise.notes import kept_warnings
+from linkwise.record.schema import DETERMINATE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,6 +34,7 @@ if TYPE_CHECKING:
     from linkwise._core import Model
     from linkwise.loads.samples import RunLike
 
+ABOUT_DETERMINATE = {"long_name": "whether rigid bodies determine it throughout the run"}
 # A load counts as on duty above this share of its peak.
 DUTY_LEVEL = 0.1
 
@@ -118,7 +126,8 @@ def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
         too, where the run holds its extremes (`Recording.extremes`); `sampling` is then what
         their search left open. Else they are those of the samples, and `sampling` is an eighth of
         the second difference, which knows smooth peaks alone. The attribute `extremes` says
-        "along the steps" or "of the samples".
+        "along the steps" or "of the samples". Of machines with loops `determinate` as well, and
+        `wrench_determinate` (joint, component): where false, the numbers are one choice of many.
     """
     import xarray as xr
 
@@ -174,6 +183,12 @@ def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
     about_missed = "share of the peak that no sample shows"
     unseen = np.where(absent, np.nan, collected.unseen())
     data["missed"] = (dims, unseen, {"long_name": about_missed, "units": "1"})
+    known = determinate_quantities(run, directions, names)
+    if known is not None:
+        data["determinate"] = (dims, known, dict(ABOUT_DETERMINATE))
+        components = run.dataset[DETERMINATE].values
+        about = dict(ABOUT_DETERMINATE)
+        data["wrench_determinate"] = (("joint", "component"), components, about)
     given = run.dataset["joint_load"]
     data["wrench"] = ((*dims, "component"), collected.wrench, dict(given.attrs))
     return xr.Dataset(
@@ -197,7 +212,8 @@ def envelope(run: RunLike) -> xr.Dataset:
     """Smallest and largest value of every load component and when: (joint, component).
 
     Returns:
-        Dataset: `minimum`, `minimum_time`, `maximum`, `maximum_time`; frame as `joint_load`.
+        Dataset: `minimum`, `minimum_time`, `maximum`, `maximum_time`; frame as `joint_load`; of
+        machines with loops `determinate` as well.
         Between the samples too, as in `summary`.
     """
     import xarray as xr
@@ -224,6 +240,9 @@ def envelope(run: RunLike) -> xr.Dataset:
     data = {name: (dims, values, dict(given.attrs)) for name, values in found.items()}
     for name, values in when.items():
         data[f"{name}_time"] = (dims, values, {"long_name": f"time of the {name}", "units": "s"})
+    if DETERMINATE in run.dataset:
+        known = run.dataset[DETERMINATE]
+        data[DETERMINATE] = (dims, known.values, dict(known.attrs))
     coords = {"joint": ("joint", joint_names(run)), "component": given["component"]}
     return xr.Dataset(data, coords=coords, attrs=_how(between))
 
@@ -234,8 +253,9 @@ def peak_loads(run: RunLike) -> xr.Dataset:
 
     Returns:
         Dataset over `joint`: `force` [N] and `moment` [N m] (magnitudes of the joint load's two
-        halves, the moment about the joint point) with `force_time` and `moment_time` [s]. Between
-        the samples too, as in `summary`.
+        halves, the moment about the joint point) with `force_time` and `moment_time` [s]. Of
+        machines with loops `force_determinate` and `moment_determinate` as well. Between the
+        samples too, as in `summary`.
 
     Raises:
         InputError: the run holds no joint loads or no samples.
@@ -263,6 +283,9 @@ def peak_loads(run: RunLike) -> xr.Dataset:
         data[name] = ("joint", largest[k], attrs)
         at_attrs = {"long_name": f"time of the largest joint {name}", "units": "s"}
         data[f"{name}_time"] = ("joint", when[k], at_attrs)
+        if DETERMINATE in run.dataset:
+            known = run.dataset[DETERMINATE].values[:, 3 * k : 3 * k + 3].all(axis=1)
+            data[f"{name}_{DETERMINATE}"] = ("joint", known, dict(ABOUT_DETERMINATE))
     joints = {"joint": ("joint", run.dataset["joint"].values)}
     attrs = {**kept_warnings(run.dataset.attrs), **_how(between)}
     return xr.Dataset(data, coords=joints, attrs=attrs)

@@ -85,7 +85,8 @@ def margins(
 
     Returns:
         Dataset over (quantity, joint): `rating`, `use` (peak with its bound over the rating) and
-        `margin` (rating over that peak, less 1; negative: overloaded). NaN where nothing is rated.
+        `margin` (rating over that peak, less 1; negative: overloaded), and `determinate` where the
+        summary has it: what is not says nothing. NaN where nothing is rated.
     """
     import xarray as xr
 
@@ -110,4 +111,7 @@ def margins(
         "use": (dims, peak / table, {"long_name": "peak over rating", "units": "1"}),
         "margin": (dims, margin, {"long_name": "rating over peak, less 1", "units": "1"}),
     }
+    if "determinate" in summary:
+        known = summary["determinate"].transpose(..., "quantity", "joint")
+        data["determinate"] = (dims, known.values, dict(known.attrs))
     return xr.Dataset(data, coords={"quantity": names, "joint": ("joint", joints)})

@@ -98,10 +98,28 @@ def _peak(value: float, bound: float) -> str:
     return f"{shown} ± {_number(bound, 1)}" if shown and np.isfinite(bound) else shown
 
 
+def _bracketed(shown: str, known: bool) -> str:
+    return shown if known or not shown else f"({shown})"
+
+
+def _known(found: xr.Dataset) -> Any:
+    """Which values rigid bodies determine: all, where the run has no loops."""
+    if "determinate" in found:
+        return found["determinate"].values
+    return np.ones((found.sizes["quantity"], found.sizes["joint"]), dtype=np.bool_)
+
+
+def _brackets(summary: xr.Dataset) -> str:
+    if _known(summary).all():
+        return ""
+    return " Numbers in brackets are not determined by rigid bodies: they are one choice of many."
+
+
 def _peak_table(summary: xr.Dataset, limits: xr.Dataset | None) -> str:
     names = [str(q) for q in summary["quantity"].values]
     units = [str(u) for u in summary["quantity_units"].values]
     peak, when = summary["peak"].values, summary["peak_time"].values
+    known = _known(summary)
     bound = _bounds(summary, limits)
     pairs = zip(names, units, strict=True)
     headings = ["joint", *(f"{name.replace('_', ' ')} [{unit}]" for name, unit in pairs)]
@@ -109,7 +127,7 @@ def _peak_table(summary: xr.Dataset, limits: xr.Dataset | None) -> str:
     for j, joint in enumerate(summary["joint"].values):
         cells = [escape(str(joint))]
         for k in range(len(names)):
-            shown = _peak(peak[k, j], bound[k, j])
+            shown = _bracketed(_peak(peak[k, j], bound[k, j]), known[k, j])
             cells.append(f"{shown}<small>at {_number(when[k, j])} s</small>" if shown else "")
         rows.append(_row(cells))
     return _table(headings, rows)
@@ -124,22 +142,24 @@ def _bounds(summary: xr.Dataset, limits: xr.Dataset | None) -> Any:
 
 def _margin_table(summary: xr.Dataset, left: xr.Dataset, limits: xr.Dataset | None) -> str:
     rows = []
-    bound = _bounds(summary, limits)
+    bound, determinate = _bounds(summary, limits), _known(summary)
     for k, quantity in enumerate(left["quantity"].values):
         for j, joint in enumerate(left["joint"].values):
             rating, use = float(left["rating"][k, j]), float(left["use"][k, j])
+            known = bool(determinate[k, j])
             if not np.isfinite(rating):
                 continue
             cells = [
                 escape(str(joint)),
                 f"{quantity} [{summary['quantity_units'].values[k]}]".replace("_", " "),
-                _peak(float(summary["peak"][k, j]), bound[k, j]),
+                _bracketed(_peak(float(summary["peak"][k, j]), bound[k, j]), known),
                 _number(rating),
-                f"{100 * use:.1f} %",
-                f"{100 * float(left['margin'][k, j]):.1f} %",
+                _bracketed(f"{100 * use:.1f} %", known),
+                _bracketed(f"{100 * float(left['margin'][k, j]):.1f} %", known),
             ]
-            rows.append((use, _row(cells, style="over" if use > 1 else "")))
-    ordered = [row for _, row in sorted(rows, key=lambda item: -item[0])]
+            # What is one choice of many is not ranked among the others.
+            rows.append(((not known, -use), _row(cells, style="over" if use > 1 else "")))
+    ordered = [row for _, row in sorted(rows, key=lambda item: item[0])]
     return _table(["joint", "quantity", "peak", "rating", "use", "margin"], ordered, "named")
 
 
@@ -148,11 +168,17 @@ def _envelope_table(run: RunLike) -> str:
     components = [str(c) for c in found["component"].values]
     headings = ["joint", *(f"{c} [{'N' if c[0] == 'f' else 'N m'}]" for c in components)]
     low, high = found["minimum"].values, found["maximum"].values
+    known = np.ones(low.shape, dtype=np.bool_)
+    if "determinate" in found:
+        known = found["determinate"].values
     rows = [
         _row(
             [
                 escape(str(joint)),
-                *(f"{_number(a)} .. {_number(b)}" for a, b in zip(low[j], high[j], strict=True)),
+                *(
+                    _bracketed(f"{_number(a)} .. {_number(b)}", one)
+                    for a, b, one in zip(low[j], high[j], known[j], strict=True)
+                ),
             ]
         )
         for j, joint in enumerate(found["joint"].values)
@@ -162,13 +188,19 @@ def _envelope_table(run: RunLike) -> str:
 
 def _fatigue_table(run: RunLike, joints: list[str]) -> str:
     found = damage_equivalent(run, joints=joints)
+    known = np.ones(found.shape[1:], dtype=np.bool_)
+    if "determinate" in found.coords:
+        known = found["determinate"].values
     components = [str(c) for c in found["component"].values]
     rows = [
         _row(
             [
                 escape(joint) if k == 0 else "",
                 f"{float(m):g}",
-                *(_number(x) for x in found.values[k, j]),
+                *(
+                    _bracketed(_number(x), one)
+                    for x, one in zip(found.values[k, j], known[j], strict=True)
+                ),
             ]
         )
         for j, joint in enumerate(joints)
@@ -244,7 +276,8 @@ def write_report(
     summary, limits, left = found["summary"], found.get("bounds"), found.get("margins")
     names = [str(name) for name in summary["joint"].values]
     force = summary["peak"].sel(quantity="force").values
-    ranked = [names[k] for k in np.argsort(-force, kind="stable")[:MOST_JOINTS]]
+    known = _known(summary)[summary["quantity"].values.tolist().index("force")]
+    ranked = [names[k] for k in np.lexsort((-force, ~known))[:MOST_JOINTS]]
     drawn = [name for name in names if name in set(ranked)]
     every = max(1, -(-run.dataset.sizes["time"] // MOST_SAMPLES))
     content = {
@@ -268,7 +301,7 @@ def write_report(
         f"<title>{title}</title><style>{_STYLE}</style></head><body><h1>{title}</h1>",
         "<p class='note'>Wrench that the inboard body exerts on the outboard body, in the joint "
         "frame fixed in the outboard body, moments about the joint point. SI units. ± is the "
-        "bound of algebraic and integration error.</p>",
+        f"bound of algebraic and integration error.{_brackets(summary)}</p>",
         _warnings(run),
         f"<h2>Peaks</h2>{_note(_PEAKS[summary.attrs['extremes']])}{_peak_table(summary, limits)}",
         f"<h2>Against the ratings</h2>{_margin_table(summary, left, limits)}"

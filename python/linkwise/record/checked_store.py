@@ -177,7 +177,7 @@ def _check_array(folder: Path, array: zarr.Array[Any]) -> None:
     if packed - _CODECS or "zstd" not in packed:
         raise damage(folder, key, "tells of a packing that linkwise does not write")
     kind = array.dtype.kind
-    if kind not in "fiuTO":
+    if kind not in "bfiuTO":
         raise damage(folder, key, f"tells of values of type {array.dtype}")
     bytes_each = array.dtype.itemsize or 16
     whole = array.shape if kind in "TO" else array.chunks  # labels are read at once

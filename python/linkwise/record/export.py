@@ -16,7 +16,7 @@ from linkwise.base import blocks
 from linkwise.io.complaint import shown
 from linkwise.io.writing import csv_cell, written_whole
 from linkwise.record.extremes import PREFIX, ROWS
-from linkwise.record.schema import TABLE
+from linkwise.record.schema import DETERMINATE, TABLE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,6 +51,8 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
                 str(name), tuple(str(dim) for dim in variable.dims), _netcdf_type(variable.dtype)
             )
             made.attrs.update(variable.attrs)
+            if variable.dtype.kind == "b":
+                made.attrs["dtype"] = "bool"  # so that xarray reads booleans again
             if name in dataset.coords or "time" not in variable.dims:
                 made[...] = _netcdf_values(variable.values)
             if name not in dataset.coords:
@@ -71,10 +73,12 @@ def _netcdf_type(dtype: np.dtype[Any]) -> Any:
         import h5py
 
         return h5py.string_dtype()
-    return dtype
+    return np.dtype(np.int8) if dtype.kind == "b" else dtype  # NetCDF knows no booleans
 
 
 def _netcdf_values(values: Any) -> Any:
+    if values.dtype.kind == "b":
+        return values.astype(np.int8)
     return values.astype(object) if values.dtype.kind == "U" else values
 
 
@@ -99,9 +103,19 @@ def _columns(variable: xr.DataArray) -> list[str]:
     ]
 
 
+def _marked(dataset: xr.Dataset, name: str) -> list[str]:
+    """Headings, which say which loads rigid bodies do not determine."""
+    columns = _columns(dataset[name])
+    if DETERMINATE not in dataset or dataset[name].dims[1:] != dataset[DETERMINATE].dims:
+        return columns
+    known = dataset[DETERMINATE].values.ravel().tolist()
+    marks = ("" if one else " (not determinate)" for one in known)
+    return [column + mark for column, mark in zip(columns, marks, strict=True)]
+
+
 def _write_table(dataset: xr.Dataset, names: list[str], path: Path) -> None:
     variables = [dataset[name] for name in names]
-    headings = ["time [s]", *(column for v in variables for column in _columns(v))]
+    headings = ["time [s]", *(column for name in names for column in _marked(dataset, name))]
     with written_whole(path) as aside, open(aside, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(map(csv_cell, headings))
@@ -123,7 +137,7 @@ def _write_extremes(dataset: xr.Dataset, names: list[str], path: Path) -> None:
         table.writerow(["quantity", "column", *headings])
         for name in names:
             values = dataset[PREFIX + name].values.reshape(len(ROWS), -1)[taken].T
-            for column, row in zip(_columns(dataset[name]), values.tolist(), strict=True):
+            for column, row in zip(_marked(dataset, name), values.tolist(), strict=True):
                 table.writerow([name, csv_cell(column), *("" if v != v else v for v in row)])
 
 

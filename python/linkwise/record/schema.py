@@ -47,10 +47,12 @@ class Schema:
     coordinates: Mapping[str, Coordinate]
     quantities: tuple[str, ...]
     extremes: ExtremesLayout | None = None
+    determinate: Variable | None = None
 
     @property
     def timeless(self) -> tuple[Variable, ...]:
-        return self.extremes.variables if self.extremes else ()
+        extremes = self.extremes.variables if self.extremes else ()
+        return extremes if self.determinate is None else (*extremes, self.determinate)
 
     @property
     def extremes_bytes(self) -> int:
@@ -63,6 +65,8 @@ class Schema:
 
 # The order in which a dataset lists its variables; extremes follow.
 ORDER = tuple(row["name"] for row in TABLE)
+#: Of runs of machines with loops: (joint, component).
+DETERMINATE = "determinate"
 TIME_ATTRS = {"long_name": "time", "units": "s"}
 
 
@@ -191,6 +195,19 @@ def _body_variables(
     return [_wrench_variable(row, "wrenched_body", bodies, False) for row in rows]
 
 
+def _determinate(variables: Sequence[Variable]) -> Variable | None:
+    """Of every component of the loads that are recorded, whether rigid bodies determine it."""
+    for load in variables:
+        if load.name == "joint_load":
+            attrs = {
+                "long_name": "whether rigid bodies determine the component of the joint load",
+                "convention": "true: in every pose of the run that was looked at; false: the value "
+                "in joint_load is one choice of many",
+            }
+            return replace(load, name=DETERMINATE, dtype=np.dtype(np.bool_), attrs=attrs)
+    return None
+
+
 def build_schema(
     model: Model,
     quantities: Collection[str] | None = None,
@@ -198,11 +215,13 @@ def build_schema(
     wrenched: Collection[str] = (),
     *,
     extremes: bool = False,
+    determinate: bool = False,
 ) -> Schema:
     """Describe a run of `model` that keeps these quantities of these joints.
 
     `wrenched` names the bodies with an external wrench, which is recorded for them alone;
-    `extremes` keeps those of loads between the samples, where loads are recorded.
+    `extremes` keeps those of loads between the samples, where loads are recorded;
+    `determinate` says which of their components rigid bodies determine.
     """
     kept = resolve_quantities(quantities)
     rows = [row for row in TABLE if row["group"] in kept]
@@ -223,7 +242,8 @@ def build_schema(
         for row in rows
         if row["axis"] == "none"
     ]
-    schema = Schema(tuple(variables), coordinates, kept)
+    known = _determinate(variables) if determinate else None
+    schema = Schema(tuple(variables), coordinates, kept, determinate=known)
     layout = extremes_layout(model, schema.variables) if extremes else None
     if layout is None:
         return schema

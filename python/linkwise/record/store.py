@@ -183,7 +183,7 @@ class RunWriter:
                 shape=variable.shape,
                 chunks=tuple(max(1, size) for size in variable.shape),
                 dtype=variable.dtype,
-                fill_value=np.nan,
+                fill_value=False if variable.dtype.kind == "b" else np.nan,
                 dimension_names=variable.dims,
                 attributes={**variable.attrs},
                 compressors=packing(),
@@ -281,8 +281,10 @@ class RunWriter:
             (folder / GROUP / SPARE).unlink(missing_ok=True)
             try:
                 self.flush()
-                if self._schema.extremes:
-                    self._write_extremes(extremes or self._schema.extremes.empty())
+                if extremes:
+                    self._write_extremes(extremes)
+                elif self._schema.extremes:
+                    self._write_extremes(self._schema.extremes.empty())
             finally:
                 self._group.update_attributes({name: plain(value) for name, value in attrs.items()})
                 with contextlib.suppress(OSError):

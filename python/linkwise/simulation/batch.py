@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import Frame, InputError, Model, as_floats
-from linkwise.base import Array
+from linkwise.base import AnyArray, Array
 from linkwise.io.complaint import shown
 from linkwise.loads.engineering import joint_directions
 from linkwise.notes import Ignored, tell, warning_attrs, warnings_of
@@ -18,7 +18,7 @@ from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
 from linkwise.simulation.arguments import check_steps, number, optional_count, sample_times
-from linkwise.simulation.determinacy import undetermined_loads
+from linkwise.simulation.determinacy import Determinacy, is_looked_at, not_looked_at
 from linkwise.simulation.recording import Recording
 from linkwise.simulation.simulate import (
     SimulationInterrupted,
@@ -140,14 +140,32 @@ def _of_loops(
         if of:
             more = f"; the like of {len(of) - 1} more members" if len(of) > 1 else ""
             notes.append(Ignored("", element, f"member {of[0]}: {texts[of[0]]}{more}"))
-    if "joint_load" not in schema.quantities:
-        return notes
-    each = len(rows["q0"]) // len(models)
-    for k, model in enumerate(models):
-        for note in undetermined_loads(model, rows["q0"][k * each], rows["v0"][k * each]):
-            if note not in notes:
-                notes.append(note)
-    return notes
+    return notes + (not_looked_at(models) if "joint_load" in schema.quantities else [])
+
+
+def _determinacy(
+    models: Sequence[Model], rows: Mapping[str, Array], columns: Mapping[str, AnyArray]
+) -> tuple[AnyArray, list[Ignored]]:
+    """Which loads of each member rigid bodies determine, and what is said of those that they do
+    not; columns: positions (members, time, nq), and the states at peaks where they are kept."""
+    known: list[AnyArray] = []
+    said: dict[Ignored, list[int]] = {}
+    positions, states = columns["position"], columns.get("extreme_state")
+    each = len(positions) // len(models)
+    for member, path in enumerate(positions):
+        start = rows["q0"][member], rows["v0"][member]
+        seen = Determinacy(models[member // each], *start, len(path))
+        seen.see(path)
+        seen.see_peaks(None if states is None else states[member])
+        known.append(seen.throughout)
+        for note in seen.notes():
+            said.setdefault(note, []).append(member)
+    notes = []
+    for note, members in said.items():
+        whose = "" if len(members) == len(positions) else f"member {members[0]}: "
+        more = f"; the same of {len(members) - 1} more members" if whose and members[1:] else ""
+        notes.append(note._replace(text=f"{whose}{note.text}{more}"))
+    return np.array(known), notes
 
 
 def simulate_batch(
@@ -207,7 +225,9 @@ def simulate_batch(
     first = models[0]
     sampled = sample_times(duration, every, times)
     keep = Recording(extremes=extremes).keeps_extremes(first.n_joints)
-    schema = build_schema(first, QUANTITIES if record is None else record, extremes=keep)
+    looked_at = all(is_looked_at(one) for one in models)
+    quantities = QUANTITIES if record is None else record
+    schema = build_schema(first, quantities, extremes=keep, determinate=looked_at)
     unknown = [name for name in schema.quantities if name not in QUANTITIES]
     if unknown:
         raise InputError(f"record: a batch has no {shown(unknown[0])}; use {', '.join(QUANTITIES)}")
@@ -239,17 +259,23 @@ def simulate_batch(
     )
     ignored = warnings_of(*models)
     tell(ignored, reading=False)
+    positions = () if schema.determinate is None else ("position",)
+    wanted = tuple(dict.fromkeys((*schema.quantities, *positions)))
     columns, flat, endings, interrupted, doubt, said = _core.simulate_members(
         simulations,
         q0=rows["q0"],
         v0=rows["v0"],
         tau=rows.get("tau"),
         times=sampled,
-        quantities=schema.quantities,
+        quantities=wanted,
         threads=optional_count("threads", threads),
     )
     if schema.extremes:
         columns |= schema.extremes.split(flat)
+    if schema.determinate is not None:
+        known, of_loads = _determinacy(models, rows, columns)
+        columns[schema.determinate.name] = known
+        notes += of_loads
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
     if not interrupted:
         ignored = [*ignored, *_of_loops(models, rows, said, schema)]

@@ -1,11 +1,16 @@
-"""Which joint loads of a machine with loops rigid bodies leave open: a warning of its runs."""
+"""Which joint loads of a machine with loops rigid bodies leave open: a variable of its runs, and
+the warning that says it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from linkwise import _core
-from linkwise.base import COMPONENTS
+from linkwise._core import InputError
+from linkwise.base import COMPONENTS, AnyArray
 from linkwise.loads.certainty import MOST_ROWS
 from linkwise.notes import Ignored
 
@@ -14,46 +19,118 @@ if TYPE_CHECKING:
 
     from linkwise._core import Model
 
+_FEW_ROWS = 100  # up to here a look takes a millisecond or less
+#: Poses of a run that are looked at besides its start: spread over the samples, and at peaks.
+_LOOKS = 8
+_PEAKS = 8
 _MOST_NAMED = 8
 _ELEMENT = "joint_load"
 
 
-def undetermined_loads(model: Model, q: npt.ArrayLike, v: npt.ArrayLike) -> list[Ignored]:
-    """What is said of loads that no rigid-body calculation knows, at the start of a run.
+def _rows(model: Model) -> int:
+    return sum(6 - freedom for freedom in model.loop_nv) + len(model.coupling_names)
+
+
+def is_looked_at(model: Model) -> bool:
+    """Whether its loads may be open, and it is small enough to find out which are."""
+    return 0 < _rows(model) <= MOST_ROWS
+
+
+class Determinacy:
+    """What was seen in the poses of one run.
 
     Args:
-        model: the machine.
+        model: the machine; one that `is_looked_at`.
         q: (nq,) [rad, m]; v: (nv,) [rad/s, m/s]: the start, which is assembled first.
+        samples: how many positions `see` will be given.
     """
-    if not model.n_loops and not model.coupling_names:
-        return []
-    if sum(6 - freedom for freedom in model.loop_nv) + len(model.coupling_names) > MOST_ROWS:
-        return [
-            Ignored(
-                "",
-                _ELEMENT,
-                "which loads of closed loops rigid bodies determine was not looked at in a machine "
-                "of this size; where constraints repeat each other they are one choice of many",
-            )
-        ]
-    found = _core.indeterminacy(model, _core.assemble(model, q, v, [])["q"])
-    names = [*model.joint_names, *model.loop_names]
-    open_loads = {
-        name: [c for c, known in zip(COMPONENTS, row, strict=True) if not known]
-        for name, row in zip(names, found.determinate, strict=True)
-    }
-    said = [f"{name!r} ({', '.join(of)})" for name, of in open_loads.items() if of]
-    if not said:
-        return []
+
+    def __init__(self, model: Model, q: npt.ArrayLike, v: npt.ArrayLike, samples: int) -> None:
+        self._model = model
+        small = _rows(model) <= _FEW_ROWS
+        looks = min(samples, _LOOKS if small else 2)
+        self._wanted = {round(k) for k in np.linspace(0, samples - 1, looks)}
+        self._peaks = _PEAKS if small else 0
+        self._seen = 0
+        self._open = np.zeros((model.n_joints + model.n_loops, len(COMPONENTS)), dtype=np.int64)
+        self._looks = 0
+        self._self_stresses = 0
+        self._look(_core.assemble(model, q, v, [])["q"])
+
+    @property
+    def throughout(self) -> AnyArray:
+        """(n_joints + n_loops, 6) [bool]: determinate in every pose that was looked at."""
+        found: AnyArray = self._open == 0
+        return found
+
+    def _look(self, q: AnyArray) -> None:
+        if not np.isfinite(q).all():
+            return
+        try:
+            found = _core.indeterminacy(self._model, q)
+        except InputError:  # of a run that went astray: its loops are open
+            return
+        self._looks += 1
+        self._open += ~found.determinate
+        self._self_stresses = max(self._self_stresses, found.rows - found.rank)
+
+    def see(self, positions: AnyArray) -> None:
+        """The next samples (time, nq); a few of all are looked at."""
+        for k in range(self._seen, self._seen + len(positions)):
+            if k in self._wanted:
+                self._look(positions[k - self._seen])
+        self._seen += len(positions)
+
+    def see_peaks(self, states: AnyArray | None) -> None:
+        """The states at the peaks of the loads, (..., state), whose first numbers are positions."""
+        if states is None or not self._peaks:
+            return
+        q = states.reshape(-1, states.shape[-1])[:, : self._model.nq]
+        different = np.unique(q, axis=0)
+        for k in {round(k) for k in np.linspace(0, len(different) - 1, self._peaks)}:
+            self._look(different[k])
+
+    def notes(self) -> list[Ignored]:
+        """What the reader of the run is told: nothing where all loads are determinate."""
+        always = self._open == self._looks
+        sometimes = ~always & (self._open > 0)
+        names = [*self._model.joint_names, *self._model.loop_names]
+        parts = []
+        if always.any():
+            parts.append(f"the loads of joints {_listed(names, always)}")
+        if sometimes.any():
+            parts.append(f"in some poses only those of joints {_listed(names, sometimes)}")
+        if not parts or not self._looks:
+            return []
+        count = self._self_stresses
+        text = (
+            f"rigid bodies do not determine {', and '.join(parts)}: {count} "
+            f"self-stress{'es' if count > 1 else ''} of the closed loops load "
+            "them by any amount, and what is shown is one choice of many; do not size parts by "
+            "it, or leave a joint of the loop more freedom (a spherical or cylindrical one)"
+        )
+        return [Ignored("", _ELEMENT, text)]
+
+
+def _listed(names: list[str], mask: AnyArray) -> str:
+    said = [
+        f"{name!r} ({', '.join(c for c, one in zip(COMPONENTS, row, strict=True) if one)})"
+        for name, row in zip(names, mask, strict=True)
+        if row.any()
+    ]
     more = f" and {len(said) - _MOST_NAMED} more" if len(said) > _MOST_NAMED else ""
-    count = found.rows - found.rank
+    return ", ".join(said[:_MOST_NAMED]) + more
+
+
+def not_looked_at(models: Iterable[Model]) -> list[Ignored]:
+    """What is said of machines that are too large to be looked at."""
+    if all(_rows(model) <= MOST_ROWS for model in models):
+        return []
     return [
         Ignored(
             "",
             _ELEMENT,
-            f"rigid bodies do not determine the loads of joints {', '.join(said[:_MOST_NAMED])}"
-            f"{more}: {count} self-stress{'es' if count > 1 else ''} of the closed loops load "
-            "them by any amount, and what is shown is one choice of many; do not size parts by "
-            "it, or leave a joint of the loop more freedom (a spherical or cylindrical one)",
+            "which loads of closed loops rigid bodies determine was not looked at in a machine "
+            "of this size; where constraints repeat each other they are one choice of many",
         )
     ]

@@ -34,7 +34,7 @@ from linkwise.simulation.arguments import (
     sample_times,
     state_vector,
 )
-from linkwise.simulation.determinacy import undetermined_loads
+from linkwise.simulation.determinacy import Determinacy, is_looked_at, not_looked_at
 from linkwise.simulation.numerics import DEFAULTS, Numerics
 from linkwise.simulation.recording import Recording
 from linkwise.simulation.time_loop import Progress, run_time_loop
@@ -185,13 +185,22 @@ def _recorder(
     return RunWriter(output, schema, attrs, samples=samples, model=model, extremes=extremes)
 
 
-def _extremes(simulation: Simulation, schema: Schema) -> dict[str, AnyArray]:
-    """What was found so far, by variable; none where a function of the caller's fails again."""
-    if schema.extremes is None:
-        return {}
-    with contextlib.suppress(Exception):
-        return schema.extremes.split(simulation.extremes())
-    return schema.extremes.empty()
+def _timeless(
+    simulation: Simulation, schema: Schema, determinacy: Determinacy | None, *, ended: bool = False
+) -> dict[str, AnyArray]:
+    """The extremes that were found so far, by variable; none where a function of the caller's fails
+    again. With them, where loops are closed, which loads are determinate."""
+    found: dict[str, AnyArray] = {}
+    if schema.extremes is not None:
+        found = schema.extremes.empty()
+        with contextlib.suppress(Exception):
+            found = schema.extremes.split(simulation.extremes())
+    if determinacy is not None and schema.determinate is not None:
+        if ended:
+            determinacy.see_peaks(found.get("extreme_state"))
+        known, take = determinacy.throughout, schema.determinate.take
+        found[schema.determinate.name] = known if take is None else known[take]
+    return found
 
 
 def _record(
@@ -203,6 +212,7 @@ def _record(
     progress: Callable[[Progress], object] | None,
     solver_doubt: Callable[[float], Ignored | None],
     ignored: Sequence[Ignored],
+    determinacy: Determinacy | None,
 ) -> tuple[Run, Ending]:
     """Simulate and record. Whatever goes wrong, the samples so far become a complete run.
 
@@ -210,20 +220,24 @@ def _record(
     """
     started = clock.monotonic()
     try:
-        ending = run_time_loop(simulation, record, schema, times, progress)
+        see = None if determinacy is None else determinacy.see
+        ending = run_time_loop(simulation, record, schema, times, progress, see)
     except BaseException as error:
         # A function of the caller's (a drive, the progress) raised an exception, or the disk is
         # full.
         said = {"outcome": "error", "message": f"{type(error).__name__}: {error}"}
         with contextlib.suppress(Exception):
-            said |= warning_attrs([*_noticed(simulation, ignored), *ignored])
-            record.finish(said, _extremes(simulation, schema))
+            found = _timeless(simulation, schema, determinacy, ended=True)
+            said |= warning_attrs([*_noticed(simulation, ignored), *ignored, *_open(determinacy)])
+            record.finish(said, found)
         raise
     attrs = _attributes_at_end(simulation, clock.monotonic() - started)
     doubt = solver_doubt(simulation.statistics.solver_error)
     attrs["solver_error"] = "bounded" if doubt is None else "not bounded"
-    noticed = [*_noticed(simulation, ignored), *ignored, *([] if doubt is None else [doubt])]
-    finished = record.finish(attrs | warning_attrs(noticed), _extremes(simulation, schema))
+    found = _timeless(simulation, schema, determinacy, ended=True)
+    noticed = [*_noticed(simulation, ignored), *ignored, *_open(determinacy)]
+    noticed += [] if doubt is None else [doubt]
+    finished = record.finish(attrs | warning_attrs(noticed), found)
     return Run(finished, record.path, model), ending
 
 
@@ -275,15 +289,16 @@ def _coarse_solver(simulation: Simulation, options: Mapping[str, Any]) -> list[I
     ]
 
 
-def _of_loops(
-    simulation: Simulation, model: Model, start: tuple[Array, Array], schema: Schema
-) -> list[Ignored]:
-    """What was moved to close the loops, and which of their loads are not determined."""
+def _of_loops(simulation: Simulation, model: Model, schema: Schema) -> list[Ignored]:
+    """What was moved to close the loops, and whether their loads were not looked at."""
     moved = simulation.assembled
     said = [Ignored("", "assembly", moved)] if moved else []
-    if "joint_load" in schema.quantities:
-        said += undetermined_loads(model, *start)
-    return said
+    return said + (not_looked_at([model]) if "joint_load" in schema.quantities else [])
+
+
+def _open(determinacy: Determinacy | None) -> list[Ignored]:
+    """Which loads are not determined."""
+    return [] if determinacy is None else determinacy.notes()
 
 
 def _attributes_at_end(simulation: Simulation, wall_time: float) -> dict[str, Any]:
@@ -419,6 +434,7 @@ def simulate(
         recording.joints,
         wrenched_bodies(model, by_name),
         extremes=recording.keeps_extremes(model.n_joints),
+        determinate=is_looked_at(model),
     )
     if on_failure not in ("raise", "return"):
         raise InputError(f'on_failure: {shown(on_failure)} is unknown; use "raise" or "return"')
@@ -447,18 +463,20 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_name)
-    notes += _of_loops(simulation, model, start, schema)
+    notes += _of_loops(simulation, model, schema)
+    determinacy = Determinacy(model, *start, sampled.size) if schema.determinate else None
     ignored = [*notes, *_coarse_solver(simulation, options), *warnings_of(model)]
-    attrs |= warning_attrs(ignored)
+    attrs |= warning_attrs([*ignored, *_open(determinacy)])
     if output is None:
         _require_memory(schema, sampled.size)
     tell(warnings_of(model), reading=False)
-    recorder = _recorder(
-        model, schema, attrs, sampled.size, output, lambda: _extremes(simulation, schema)
-    )
+    timeless = partial(_timeless, simulation, schema, determinacy)
+    recorder = _recorder(model, schema, attrs, sampled.size, output, timeless)
     allowed = options.get("solver_tolerance", simulation.step_tolerance / 10)
     doubt = partial(_solver_doubt, options, allowed)
-    run, ending = _record(model, simulation, recorder, schema, sampled, progress, doubt, ignored)
+    run, ending = _record(
+        model, simulation, recorder, schema, sampled, progress, doubt, ignored, determinacy
+    )
     if on_failure == "raise":
         raise_failure(model, ending, run)
     return run

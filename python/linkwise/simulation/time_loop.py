@@ -129,8 +129,13 @@ def run_time_loop(
     schema: Schema,
     times: Array,
     progress: Callable[[Progress], object] | None = None,
+    see: Callable[[Array], object] | None = None,
 ) -> Ending:
-    """Advance through the sample times, handing each chunk of samples to the recorder."""
+    """Advance through the sample times, handing each chunk of samples to the recorder, and its
+    positions to `see`."""
+    quantities = schema.quantities
+    if see is not None:
+        quantities = tuple(dict.fromkeys((*quantities, "position")))
     pace = _Pace(most=max(1, CALL_BYTES // schema.row_bytes))
     end = float(times[-1])
     started = clock.monotonic()
@@ -140,10 +145,12 @@ def run_time_loop(
             for asked, are_samples in pace.calls(times):
                 before = clock.monotonic()
                 with interrupt.call():
-                    chunk = simulation.advance(asked, schema.quantities if are_samples else ())
+                    chunk = simulation.advance(asked, quantities if are_samples else ())
                 pace.adapt(clock.monotonic() - before)
                 if are_samples:
                     recorder.append(chunk)
+                    if see is not None:
+                        see(chunk["position"])
                     recorded += len(chunk["time"])
                 if len(chunk["time"]):
                     reached = float(chunk["time"][-1])
