@@ -11,6 +11,7 @@ import typer
 
 from linkwise.cli.loads_at import AtOption, PointOption, show_at
 from linkwise.cli.output import (
+    IN_BRACKETS,
     JsonOption,
     console,
     number,
@@ -300,7 +301,7 @@ def _bracketed(records: list[dict[str, Any]]) -> str:
     """What brackets mean, where there are any."""
     if all(record.get("determinate", True) for record in records):
         return ""
-    return "; in brackets: not determined by rigid bodies, one choice of many"
+    return IN_BRACKETS
 
 
 def _by_force(item: tuple[str, dict[str, dict[str, Any]]]) -> tuple[bool, float]:

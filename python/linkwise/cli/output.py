@@ -101,6 +101,11 @@ def number(value: float, digits: int = 4) -> str:
     return "" if not math.isfinite(value) else f"{value:.{digits}g}"
 
 
+_KNOWN = ("force_determinate", "moment_determinate")
+#: What titles of tables add where there are any.
+IN_BRACKETS = "; in brackets: not determined by rigid bodies, one choice of many"
+
+
 def whose(extremes: str) -> str:
     """What titles of peaks add, by the attribute `extremes`: nothing unless samples stand there."""
     return "" if extremes == "along the steps" else f" {extremes} (the run holds no extremes)"
@@ -110,7 +115,8 @@ def peak_records(run: Run) -> tuple[list[dict[str, Any]], str]:
     """Per joint the largest force and moment and when, as plain records; the attribute `extremes`
     of the peaks."""
     peaks = run.peak_loads()
-    columns = ("force", "force_time", "moment", "moment_time")
+    columns = ["force", "force_time", "moment", "moment_time"]
+    columns += [name for name in _KNOWN if name in peaks]
     values = [peaks[name].values.tolist() for name in columns]
     records = [
         {"joint": joint, **dict(zip(columns, row, strict=True))}
@@ -119,13 +125,23 @@ def peak_records(run: Run) -> tuple[list[dict[str, Any]], str]:
     return records, str(peaks.attrs["extremes"])
 
 
+def bracketed(record: Mapping[str, Any], name: str) -> str:
+    """A force or a moment, in brackets where rigid bodies do not determine it."""
+    shown = number(record[name])
+    return shown if record.get(f"{name}_determinate", True) else f"({shown})"
+
+
 def peak_table(records: Sequence[Mapping[str, Any]], extremes: str, limit: int = 40) -> Table:
     """What `peak_records` returned as a table; of many joints those with the largest forces."""
     shown = list(records)
     title = f"Peak joint loads{whose(extremes)}"
     if len(shown) > limit:
-        shown = sorted(shown, key=lambda record: -record["force"])[:limit]
+        shown = sorted(
+            shown, key=lambda record: (not record.get(_KNOWN[0], True), -record["force"])
+        )[:limit]
         title += f" (the {limit} largest forces of {len(records)} joints)"
+    if not all(record.get(name, True) for record in shown for name in _KNOWN):
+        title += IN_BRACKETS
     made = table(
         title,
         [
@@ -139,9 +155,9 @@ def peak_table(records: Sequence[Mapping[str, Any]], extremes: str, limit: int =
     for record in shown:
         made.add_row(
             text(record["joint"]),
-            number(record["force"]),
+            bracketed(record, "force"),
             number(record["force_time"]),
-            number(record["moment"]),
+            bracketed(record, "moment"),
             number(record["moment_time"]),
         )
     return made

@@ -9,7 +9,9 @@ import typer
 
 from linkwise.cli.output import (
     FAILED,
+    IN_BRACKETS,
     JsonOption,
+    bracketed,
     console,
     number,
     print_json,
@@ -96,6 +98,9 @@ def member_records(found: xr.Dataset, keys: list[str]) -> list[dict[str, Any]]:
                 f"largest_{half}": float(own[at]),
                 f"{half}_joint": str(found["joint"].values[at]),
             }
+            if f"{half}_determinate" in peaks:
+                known = peaks[f"{half}_determinate"].isel(member=k).values[at]
+                record[f"largest_{half}_determinate"] = bool(known)
         records.append(record)
     return records
 
@@ -104,15 +109,19 @@ def _member_table(records: list[dict[str, Any]], keys: list[str]) -> Any:
     columns = [(text(key), "right") for key in keys]
     columns += [("outcome", "left"), ("force [N]", "right"), ("joint", "left")]
     columns += [("moment [N m]", "right"), ("joint", "left")]
-    made = table("Largest joint loads of each member", columns)
+    title = "Largest joint loads of each member"
+    halves = [f"largest_{half}" for half in ("force", "moment")]
+    if not all(record.get(f"{half}_determinate", True) for record in records for half in halves):
+        title += IN_BRACKETS
+    made = table(title, columns)
     for record in records:
         values = [v if isinstance(v, str) else number(v) for v in (record[key] for key in keys)]
         made.add_row(
             *(text(v) for v in values),
             record["outcome"],
-            number(record.get("largest_force", float("nan"))),
+            bracketed({halves[0]: float("nan")} | record, halves[0]),
             text(record.get("force_joint", "")),
-            number(record.get("largest_moment", float("nan"))),
+            bracketed({halves[1]: float("nan")} | record, halves[1]),
             text(record.get("moment_joint", "")),
         )
     return made

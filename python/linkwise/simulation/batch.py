@@ -143,11 +143,29 @@ def _of_loops(
     return notes + (not_looked_at(models) if "joint_load" in schema.quantities else [])
 
 
-def _determinacy(
-    models: Sequence[Model], rows: Mapping[str, Array], columns: Mapping[str, AnyArray]
-) -> tuple[AnyArray, list[Ignored]]:
-    """Which loads of each member rigid bodies determine, and what is said of those that they do
-    not; columns: positions (members, time, nq), and the states at peaks where they are kept."""
+def _schema(models: Sequence[Model], record: Collection[str] | None, extremes: bool) -> Schema:
+    """What a batch holds."""
+    known = all(is_looked_at(one) for one in models)
+    wanted = QUANTITIES if record is None else record
+    return build_schema(models[0], wanted, extremes=extremes, determinate=known)
+
+
+def _asked(schema: Schema) -> tuple[str, ...]:
+    """What the core is to return: positions even where they are not recorded, to look at them."""
+    positions = () if schema.determinate is None else ("position",)
+    return tuple(dict.fromkeys((*schema.quantities, *positions)))
+
+
+def _add_determinate(
+    columns: dict[str, AnyArray],
+    schema: Schema,
+    models: Sequence[Model],
+    rows: Mapping[str, Array],
+) -> list[Ignored]:
+    """Add which loads of each member rigid bodies determine; what is said of those that they do
+    not. columns: positions (members, time, nq), and the states at peaks where they are kept."""
+    if schema.determinate is None:
+        return []
     known: list[AnyArray] = []
     said: dict[Ignored, list[int]] = {}
     positions, states = columns["position"], columns.get("extreme_state")
@@ -165,7 +183,8 @@ def _determinacy(
         whose = "" if len(members) == len(positions) else f"member {members[0]}: "
         more = f"; the same of {len(members) - 1} more members" if whose and members[1:] else ""
         notes.append(note._replace(text=f"{whose}{note.text}{more}"))
-    return np.array(known), notes
+    columns[schema.determinate.name] = np.array(known)
+    return notes
 
 
 def simulate_batch(
@@ -225,9 +244,7 @@ def simulate_batch(
     first = models[0]
     sampled = sample_times(duration, every, times)
     keep = Recording(extremes=extremes).keeps_extremes(first.n_joints)
-    looked_at = all(is_looked_at(one) for one in models)
-    quantities = QUANTITIES if record is None else record
-    schema = build_schema(first, quantities, extremes=keep, determinate=looked_at)
+    schema = _schema(models, record, keep)
     unknown = [name for name in schema.quantities if name not in QUANTITIES]
     if unknown:
         raise InputError(f"record: a batch has no {shown(unknown[0])}; use {', '.join(QUANTITIES)}")
@@ -259,23 +276,18 @@ def simulate_batch(
     )
     ignored = warnings_of(*models)
     tell(ignored, reading=False)
-    positions = () if schema.determinate is None else ("position",)
-    wanted = tuple(dict.fromkeys((*schema.quantities, *positions)))
     columns, flat, endings, interrupted, doubt, said = _core.simulate_members(
         simulations,
         q0=rows["q0"],
         v0=rows["v0"],
         tau=rows.get("tau"),
         times=sampled,
-        quantities=wanted,
+        quantities=_asked(schema),
         threads=optional_count("threads", threads),
     )
     if schema.extremes:
         columns |= schema.extremes.split(flat)
-    if schema.determinate is not None:
-        known, of_loads = _determinacy(models, rows, columns)
-        columns[schema.determinate.name] = known
-        notes += of_loads
+    notes += _add_determinate(columns, schema, models, rows)
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
     if not interrupted:
         ignored = [*ignored, *_of_loops(models, rows, said, schema)]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _FEW_ROWS = 100  # up to here a look takes a millisecond or less
 #: Poses of a run that are looked at besides its start: spread over the samples, and at peaks.
-_LOOKS = 8
+_POSES = 8
 _PEAKS = 8
 _MOST_NAMED = 8
 _ELEMENT = "joint_load"
@@ -48,14 +48,14 @@ class Determinacy:
     def __init__(self, model: Model, q: npt.ArrayLike, v: npt.ArrayLike, samples: int) -> None:
         self._model = model
         small = _rows(model) <= _FEW_ROWS
-        looks = min(samples, _LOOKS if small else 2)
-        self._wanted = {round(k) for k in np.linspace(0, samples - 1, looks)}
+        poses = min(samples, _POSES if small else 2)
+        self._wanted = {round(k) for k in np.linspace(0, samples - 1, poses)}
         self._peaks = _PEAKS if small else 0
         self._seen = 0
         self._open = np.zeros((model.n_joints + model.n_loops, len(COMPONENTS)), dtype=np.int64)
-        self._looks = 0
+        self._count = 0
         self._self_stresses = 0
-        self._look(_core.assemble(model, q, v, [])["q"])
+        self._classify(_core.assemble(model, q, v, [])["q"])
 
     @property
     def throughout(self) -> AnyArray:
@@ -63,22 +63,22 @@ class Determinacy:
         found: AnyArray = self._open == 0
         return found
 
-    def _look(self, q: AnyArray) -> None:
+    def _classify(self, q: AnyArray) -> None:
         if not np.isfinite(q).all():
             return
         try:
             found = _core.indeterminacy(self._model, q)
         except InputError:  # of a run that went astray: its loops are open
             return
-        self._looks += 1
-        self._open += ~found.determinate
+        self._count += 1
+        self._open += np.logical_not(found.determinate)
         self._self_stresses = max(self._self_stresses, found.rows - found.rank)
 
     def see(self, positions: AnyArray) -> None:
         """The next samples (time, nq); a few of all are looked at."""
         for k in range(self._seen, self._seen + len(positions)):
             if k in self._wanted:
-                self._look(positions[k - self._seen])
+                self._classify(positions[k - self._seen])
         self._seen += len(positions)
 
     def see_peaks(self, states: AnyArray | None) -> None:
@@ -88,11 +88,11 @@ class Determinacy:
         q = states.reshape(-1, states.shape[-1])[:, : self._model.nq]
         different = np.unique(q, axis=0)
         for k in {round(k) for k in np.linspace(0, len(different) - 1, self._peaks)}:
-            self._look(different[k])
+            self._classify(different[k])
 
     def notes(self) -> list[Ignored]:
         """What the reader of the run is told: nothing where all loads are determinate."""
-        always = self._open == self._looks
+        always = self._open == self._count
         sometimes = ~always & (self._open > 0)
         names = [*self._model.joint_names, *self._model.loop_names]
         parts = []
@@ -100,7 +100,7 @@ class Determinacy:
             parts.append(f"the loads of joints {_listed(names, always)}")
         if sometimes.any():
             parts.append(f"in some poses only those of joints {_listed(names, sometimes)}")
-        if not parts or not self._looks:
+        if not parts or not self._count:
             return []
         count = self._self_stresses
         text = (

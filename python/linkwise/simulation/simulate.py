@@ -415,8 +415,7 @@ def simulate(
     each where `linkwise.load` did not say it. `run.warnings` also names tables that do not cover
     the run, functions whose short changes may be missed, since when the motion is stiff, forces
     whose gain is so large that they are not known well, loads of closed loops that rigid bodies do
-    not determine, and an iterative solver whose errors are
-    not bounded.
+    not determine (`run.determinate`), and an iterative solver whose errors are not bounded.
     """
     sampled = sample_times(duration, every, times)
     start = (
@@ -474,9 +473,8 @@ def simulate(
     recorder = _recorder(model, schema, attrs, sampled.size, output, timeless)
     allowed = options.get("solver_tolerance", simulation.step_tolerance / 10)
     doubt = partial(_solver_doubt, options, allowed)
-    run, ending = _record(
-        model, simulation, recorder, schema, sampled, progress, doubt, ignored, determinacy
-    )
+    told = doubt, ignored, determinacy
+    run, ending = _record(model, simulation, recorder, schema, sampled, progress, *told)
     if on_failure == "raise":
         raise_failure(model, ending, run)
     return run
