@@ -119,9 +119,22 @@ void add_coupling(ModelBuilder& builder, std::string name, const nb::dict& facto
   CouplingSpec coupling;
   coupling.name = std::move(name);
   coupling.offset = offset;
-  for (auto [joint, factor] : factors)
-    coupling.terms.push_back(
-        {name_in(nb::borrow(joint), "a coupled joint"), real_number(factor, "factor")});
+  for (auto [joint, given] : factors) {
+    CouplingSpec::Term term{name_in(nb::borrow(joint), "a coupled joint"), 0};
+    if (nb::isinstance<nb::sequence>(given) && !nb::isinstance<nb::str>(given)) {
+      const size_t n = nb::len(given);
+      if (n < 1 || n > 4)
+        throw InputError(
+            "coupling '" + coupling.name + "': joint '" + term.joint + "' has " +
+            std::to_string(n) +
+            " factors; give those of its coordinate and of its powers up to the fourth");
+      for (size_t k = 0; k < n; ++k)
+        (k == 0 ? term.factor : term.higher[k - 1]) = real_number(given[k], "factor");
+    } else {
+      term.factor = real_number(given, "factor");
+    }
+    coupling.terms.push_back(std::move(term));
+  }
   builder.add_coupling(std::move(coupling));
 }
 
@@ -245,14 +258,17 @@ Args:
 Raises:
     InputError: the length is negative, a property is unknown, or an array has another shape.)")
       .def("add_coupling", &add_coupling, "name"_a, "factors"_a, nb::kw_only(), "offset"_a = 0.0,
-           R"(Ties coordinates of joints together, as gears, racks, screws and differentials do.
+           R"(Ties coordinates of joints together, as gears, racks, screws, differentials and cams do.
 
-The sum of factor times coordinate is offset at all times. The coupling's load, one number, acts on
-each joint as the torque or force factor times load.
+The sum of factor times coordinate is offset at all times; a list of factors is that of a polynomial
+without a constant, of the coordinate and its second, third and fourth power. The coupling's load,
+one number, acts on each joint as the torque or force factor times load, of a polynomial its slope
+times load. Joints that close loops may be coupled, too.
 
 Args:
     name: unique among couplings.
-    factors: that of each joint, by its name; joints of one degree of freedom [rad, m].
+    factors: that of each joint, or up to four, by its name; joints of one degree of freedom
+        [rad, m].
     offset: what the sum is.
 
 Raises:

@@ -94,10 +94,10 @@ nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb:
 }
 
 nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
-                       nb::handle external, bool passive, const std::string& method,
-                       const std::string& solver, nb::handle threads) {
+                       nb::handle external, nb::handle loop_tau, bool passive,
+                       const std::string& method, const std::string& solver, nb::handle threads) {
   return forward_dynamics(
-      self, States(*self.model, q, v, tau, "tau", external), passive, 1.0,
+      self, States(*self.model, q, v, tau, "tau", external, nb::none(), loop_tau), passive, 1.0,
       options_of(method, solver, nb::none(), nb::none(), nb::none(), nb::none()), threads,
       Wanted::loads);
 }
@@ -219,17 +219,17 @@ void bind_forward(nb::module_& m) {
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
          bool passive, const std::string& method, const std::string& solver, nb::handle tolerance,
          nb::handle stop, nb::handle max_iterations, nb::handle solver_options, nb::handle threads,
-         bool full, double gravity, nb::handle prescribed) {
+         bool full, double gravity, nb::handle prescribed, nb::handle loop_tau) {
         return forward_dynamics(
-            self, States(*self.model, q, v, tau, "tau", external, prescribed), passive, gravity,
-            options_of(method, solver, tolerance, stop, max_iterations, solver_options), threads,
-            full ? Wanted::full : Wanted::accelerations);
+            self, States(*self.model, q, v, tau, "tau", external, prescribed, loop_tau), passive,
+            gravity, options_of(method, solver, tolerance, stop, max_iterations, solver_options),
+            threads, full ? Wanted::full : Wanted::accelerations);
       },
       "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(), nb::kw_only(),
       "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto", "solver"_a = "auto",
       "tolerance"_a = nb::none(), "stop"_a = nb::none(), "max_iterations"_a = nb::none(),
       "solver_options"_a = nb::none(), "threads"_a = nb::none(), "full"_a = false,
-      "gravity"_a = 1.0, "prescribed"_a = nb::none(),
+      "gravity"_a = 1.0, "prescribed"_a = nb::none(), "loop_tau"_a = nb::none(),
       doc::text(
           "Accelerations that torques cause, by the method asked for.",
           {doc::q_v_tau, doc::external, doc::passive,
@@ -239,7 +239,7 @@ void bind_forward(nb::module_& m) {
     solver_options: further options by name, as in linkwise.solver_options(); they go first.
     full: return everything.
 )",
-           doc::gravity, doc::prescribed},
+           doc::gravity, doc::prescribed, doc::loop_tau},
           "    dv/dt (..., nv) [rad/s2, m/s2]; with full a ForwardDynamicsResult.",
           R"(a name is unknown, shapes do not fit the model, or a number is not finite.
     NumericsError: the method failed; not with full, whose report says so.)")
@@ -289,12 +289,12 @@ determined. Loads that rigid bodies do not determine are those of least energy, 
       "Joint loads", "    (..., n_joints + n_loops, 6) [N, N m]: as of joint_loads.");
   m.def(
       "joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
-      nb::kw_only(), "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto",
-      "solver"_a = "auto", "threads"_a = nb::none(),
+      nb::kw_only(), "external"_a = nb::none(), "loop_tau"_a = nb::none(), "passive"_a = false,
+      "method"_a = "auto", "solver"_a = "auto", "threads"_a = nb::none(),
       doc::text(
           R"(Joint loads of the motion that torques cause: w_n = M_n a_n + p_n + the loads outboard
 [luh1980].)",
-          {doc::q_v_tau, doc::external, doc::passive,
+          {doc::q_v_tau, doc::external, doc::loop_tau, doc::passive,
            "    method, solver: as of forward_dynamics.\n"},
           R"(    (..., n_joints + n_loops, 6) [N, N m]: the wrench that the inboard body exerts on the outboard
     body through the joint, drive and passive forces included, at the joint point, in the joint frame

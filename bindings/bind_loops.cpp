@@ -134,9 +134,7 @@ Raises:
     InputError: as ModelBuilder.add_coupling and build.)");
 }
 
-}  // namespace
-
-void bind_loop_joints(ModelClass& c) {
+void bind_loop_coordinates(ModelClass& c) {
   c.def_prop_ro(
        "loop_types",
        [](const PyModel& s) {
@@ -157,13 +155,40 @@ void bind_loop_joints(ModelClass& c) {
           "Degrees of freedom that each joint that closes a loop leaves to its two links; it takes "
           "the rest of six.")
       .def_prop_ro(
-          "loop_axes",
+          "loop_slices",
           [](const PyModel& s) {
+            const auto slice = [](int first, int n) {
+              return nb::slice(nb::int_(first), nb::int_(first + n), nb::int_(1));
+            };
             return list_per_loop(s, [&](const LoopJoint& l) {
-              return l.kind == LoopKind::joint ? axes_of(s.model->spec_of(l.joint)) : nb::list();
+              return nb::make_tuple(slice(l.joint.q, l.joint.nq), slice(l.joint.v, l.joint.nv));
             });
           },
-          "Axes of each joint that closes a loop, as joint_axes; none of rods and springs.")
+          "Where the coordinates and the rates of each joint that closes a loop are among those of "
+          "all loop joints: two slices each.")
+      .def(
+          "loop_property",
+          [](const PyModel& s, const std::string& name) {
+            return to_numpy(s.model->loops.dof[static_cast<int>(dof_property_from_name(name))]);
+          },
+          "name"_a,
+          "A property of the rates of all loop joints, by its name, such as \"lower\", \"upper\" "
+          "or "
+          "\"damping\"; InputError if unknown.");
+}
+
+}  // namespace
+
+void bind_loop_joints(ModelClass& c) {
+  bind_loop_coordinates(c);
+  c.def_prop_ro(
+       "loop_axes",
+       [](const PyModel& s) {
+         return list_per_loop(s, [&](const LoopJoint& l) {
+           return l.kind == LoopKind::joint ? axes_of(s.model->spec_of(l.joint)) : nb::list();
+         });
+       },
+       "Axes of each joint that closes a loop, as joint_axes; none of rods and springs.")
       .def_prop_ro(
           "loop_parent_link_names",
           [](const PyModel& s) {
@@ -190,6 +215,19 @@ void bind_loop_joints(ModelClass& c) {
           "loop"_a,
           "Suffix and unit of the coordinates and the rates of loop joint number `loop`, as "
           "joint_labels.")
+      .def_prop_ro(
+          "coupling_joints",
+          [](const PyModel& s) {
+            nb::list out;
+            for (const Coupling& coupling : s.model->couplings) {
+              nb::list joints;
+              for (const Coupling::Term& term : coupling.terms)
+                joints.append(s.model->joint_at(term.joint).name);
+              out.append(joints);
+            }
+            return out;
+          },
+          "Names of the joints that each coupling ties together, in the order of its loads.")
       .def_prop_ro(
           "coupling_names",
           [](const PyModel& s) {

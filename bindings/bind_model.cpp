@@ -319,6 +319,12 @@ void bind_places(ModelClass& c) {
        "name"_a,
        "Position of a joint in all that is per joint, by its name; InputError if unknown.")
       .def(
+          "load_index",
+          [](const PyModel& s, const std::string& name) { return s.model->load_index(name); },
+          "name"_a,
+          "Row of a joint's load, by its name: joints that close loops stand behind those of the "
+          "tree. InputError if unknown.")
+      .def(
           "q_slice",
           [](const PyModel& s, const std::string& name) {
             const JointInfo& j = s.model->joints[s.model->joint_index(name)];

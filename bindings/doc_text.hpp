@@ -22,6 +22,10 @@ inline constexpr const char* external =
     R"(    external: wrenches (..., n_joints, 6) [N, N m] on the joints' child links, each at its joint
         point, in its joint frame, force first; None: no wrench.
 )";
+inline constexpr const char* loop_tau =
+    R"(    loop_tau: torques and forces of the joints that close loops (..., sum of their nv) [N m, N], in
+        the order of model.loop_slices; None: none.
+)";
 inline constexpr const char* passive =
     "    passive: adds the model's damping, friction, springs and stops to tau.\n";
 inline constexpr const char* gravity =

@@ -96,11 +96,11 @@ void PySimulation::clear() {
 }
 
 size_t PySimulation::width(const std::string& joint) const {
-  return model->joints[model->joint_index(joint)].nv;
+  return model->joint_at(model->load_index(joint)).nv;
 }
 
 void PySimulation::set(const std::string& joint, Drive drive) {
-  simulation.set_drive(model->joint_index(joint), std::move(drive));
+  simulation.set_drive(model->load_index(joint), std::move(drive));
 }
 
 void PySimulation::torque(const std::string& name, nb::handle values) {
@@ -121,7 +121,7 @@ void PySimulation::torque_table(const std::string& name, nb::handle times, nb::h
 
 void PySimulation::torque_callable(const std::string& name, nb::callable fn, nb::handle breakpoints,
                                    nb::handle samples) {
-  const JointInfo& info = model->joints[model->joint_index(name)];
+  const JointInfo& info = model->joint_at(model->load_index(name));
   Drive d;
   d.kind = DriveKind::torque_callable;
   d.course = course_of(breakpoints, samples, width(name));

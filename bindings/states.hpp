@@ -11,21 +11,23 @@ inline size_t size(int n) { return static_cast<size_t>(n); }
 
 /// q, v, tau and external wrenches with their leading axes broadcast.
 struct States {
-  Argument q, v, tau, external, prescribed;
+  Argument q, v, tau, external, prescribed, loop_tau;
   Shape lead;
   size_t count;
 
   States(const Model& m, nb::handle q_, nb::handle v_, nb::handle tau_, const char* tau_name,
-         nb::handle external_, nb::handle prescribed_ = nb::none())
+         nb::handle external_, nb::handle prescribed_ = nb::none(),
+         nb::handle loop_tau_ = nb::none())
       : q("q", {size(m.nq())}, q_),
         v("v", {size(m.nv())}, v_),
         tau(tau_name, {size(m.nv())}, tau_),
         external("external", {size(m.n_joints()), 6}, external_),
-        prescribed("prescribed", {size(m.nv())}, prescribed_) {
+        prescribed("prescribed", {size(m.nv())}, prescribed_),
+        loop_tau("loop_tau", {size(m.loops.nv)}, loop_tau_) {
     if (!q.given)
       throw InputError("q is missing; give an array of shape (..., " + std::to_string(m.nq()) +
                        ")");
-    lead = broadcast_leading({&q, &v, &tau, &external, &prescribed});
+    lead = broadcast_leading({&q, &v, &tau, &external, &prescribed, &loop_tau});
     count = product(lead);
     for (size_t i = 0; i < count; ++i) check_quaternions(m, q.data + i * m.nq());
   }
@@ -38,6 +40,7 @@ struct States {
     in.tau = tau.data;
     in.external = external.data;
     in.du = prescribed.data;
+    in.loop_tau = loop_tau.data;
     return in;
   }
 };

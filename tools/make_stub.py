@@ -31,7 +31,7 @@ TARGETS: tuple[str, ...]
 ARRAYS = (
     "acceleration axes axis breakpoints child_point child_rotation child_translation com "
     "directions external f gravity guess inertia initial point "
-    "origin prescribed q q0 rotation target tau times translation v v0 value values"
+    "loop_tau origin prescribed q q0 rotation target tau times translation v v0 value values"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "arg": "Any",  # without a name: what pickling has kept
@@ -40,7 +40,7 @@ PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "body": "str | int",
     "frame": "str | Frame",
     "samples": "tuple[npt.ArrayLike, npt.ArrayLike]",
-    "factors": "dict[str, float]",
+    "factors": "Mapping[str, float | Sequence[float]]",
     "fn": "Callable[..., Any]",
     "mass": "float",
     "options": "Any",
@@ -67,6 +67,7 @@ RETURNS = {
     "DynamicsMethod.follow": "dict[str, Any]",
     "Frame.__getstate__": "tuple[str, Array, Array]",
     "Model.child_link_names": "list[str]",
+    "Model.coupling_joints": "list[list[str]]",
     "Model.coupling_names": "list[str]",
     "Model.frame_placement": "tuple[str | None, Array, Array]",
     "Model.joint_labels": "tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str], ...]]",
@@ -83,6 +84,7 @@ RETURNS = {
     "Model.loop_names": "list[str]",
     "Model.loop_nv": "list[int]",
     "Model.loop_parent_link_names": "list[str]",
+    "Model.loop_slices": "list[tuple[slice, slice]]",
     "Model.loop_types": "list[str]",
     "Model.parent_link_names": "list[str]",
     "Model.welds": "list[tuple[str, str, str]]",
@@ -90,6 +92,7 @@ RETURNS = {
     "Simulation.trace": "dict[str, Any]",
     "forward_dynamics": "Any",
     "initial_guesses": "list[dict[str, str]]",
+    "loop_coordinates": "tuple[Array, Array]",
     "integrators": "list[dict[str, Any]]",
     "measure_serial_part": "dict[str, float]",
     "methods": "list[dict[str, Any]]",

@@ -16,6 +16,8 @@ GOOD = {
     "v": lambda rng, model: _batch(rng, _normal(rng, model.nv)),
     "state": lambda rng, model: model.initial_configuration(),
     "rates": lambda rng, model: _normal(rng, model.nv),
+    "loop_rates": lambda rng, model: _normal(rng, model.loop_property("damping").size),
+    "dof_property": lambda rng, model: rng.choice(("damping", "lower", "armature")),
     "wrenches": lambda rng, model: _normal(rng, (model.n_joints, 6)),
     "force": lambda rng, model: _normal(rng, 5 * model.n_joints),
     "three_times": lambda rng, model: np.array([0.0, 0.1, 0.2]),
@@ -60,17 +62,20 @@ GOOD = {
 }
 # Each function with its arguments: `*` those that are always given.
 CALLS = {
-    "forward_dynamics": "*q *v tau:v external:wrenches passive:flag method solver tolerance stop "
-    "max_iterations:count solver_options:options threads full:flag gravity:number",
+    "forward_dynamics": "*q *v tau:v loop_tau:loop_rates external:wrenches passive:flag method "
+    "solver tolerance stop max_iterations:count solver_options:options threads full:flag "
+    "gravity:number",
     "inverse_dynamics": "*q *v *acceleration:v external:wrenches driven:joints passive:flag "
     "gravity:number threads",
     "inverse_dynamics_loads": "*q *v *acceleration:v external:wrenches driven:joints passive:flag "
     "gravity:number threads",
-    "joint_loads": "*q *v tau:v external:wrenches passive:flag method solver threads",
+    "joint_loads": "*q *v tau:v loop_tau:loop_rates external:wrenches passive:flag method solver "
+    "threads",
     "joint_loads_by_cause": "*causes *q *v tau:v external:wrenches method threads",
     "joint_poses": "*q threads",
     "link_poses": "*q threads",
     "loop_gaps": "*q",
+    "loop_coordinates": "*q v",
     "indeterminacy": "*q:state",
     "assemble": "q0:state v0:rates",
     "mass_matrix": "*q threads",
@@ -91,6 +96,8 @@ CALLS = {
 METHODS = {
     "joint_labels": "*joint:index",
     "joint_index": "*name:joint",
+    "load_index": "*name:joint",
+    "loop_property": "*name:dof_property",
     "q_slice": "*joint",
     "v_slice": "*joint",
     "dof_property": "*name:property",

@@ -341,7 +341,8 @@ class Motion(Drive):
             )
 
     def check(self, model: Model, joint: str, end: float) -> None:
-        dofs = model.v_slice(joint)
+        loop = model.load_index(joint) - model.n_joints
+        dofs = model.v_slice(joint) if loop < 0 else model.loop_slices[loop][1]
         if isinstance(self.value, Table):
             first, last = self.value.times[0], self.value.times[-1]
             if first > 0 or last < end * (1 - 1e-12):
@@ -358,7 +359,10 @@ class Motion(Drive):
                 f"motion: gives {positions.shape[1]} positions for {dofs.stop - dofs.start} "
                 "degrees of freedom"
             )
-        lower, upper = model.lower_limit[dofs], model.upper_limit[dofs]
+        lower, upper = model.lower_limit, model.upper_limit
+        if loop >= 0:
+            lower, upper = model.loop_property("lower"), model.loop_property("upper")
+        lower, upper = lower[dofs], upper[dofs]
         slack = 1e-9 * (1 + np.abs(positions).max())
         out = np.argwhere((positions < lower - slack) | (positions > upper + slack))
         if out.size:

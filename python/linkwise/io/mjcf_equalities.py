@@ -1,5 +1,5 @@
 """Equality constraints of an MJCF: <connect> is a spherical joint, <weld> a fixed one, and <joint>
-a coupling, where it is linear.
+a coupling.
 
 What MuJoCo's compiler keeps of them (MjModel.eq_data; checked against its residuals): a connect has
 its point in body 1 and in body 2; a weld has a point in body 2, the same point in body 1, and the
@@ -40,7 +40,7 @@ class Equalities:
     def __init__(self, mj_model: Any, rotation: Any, joints: list[str]) -> None:
         """rotation: matrix of a quaternion; joints: their names."""
         self.closures: list[Closure] = []
-        self.couplings: list[tuple[str, dict[str, float], float]] = []
+        self.couplings: list[tuple[str, dict[str, list[float]], float]] = []
         taken = set(joints)
         self._model, self._rotation = mj_model, rotation
         self._left_out: dict[str, int] = {}
@@ -78,13 +78,12 @@ class Equalities:
         ends = (int(self._model.eq_obj1id[index]), int(self._model.eq_obj2id[index]))
         return [joint for joint in ends if joint >= 0]
 
-    def _coupling(self, index: int, joints: list[str]) -> tuple[dict[str, float], float]:
-        """Factors by joint and offset."""
-        factors = [1.0, -float(self._model.eq_data[index][1])]
+    def _coupling(self, index: int, joints: list[str]) -> tuple[dict[str, list[float]], float]:
+        """Factors by joint, of its powers, and offset: y = a0 + a1 x + ... of the two joints."""
+        data = [float(x) for x in self._model.eq_data[index][:5]]
+        factors = [[1.0], [-x for x in data[1:]]]
         coupled = zip(self._coupled(index), factors, strict=False)
-        return {joints[k]: factor for k, factor in coupled if factor}, float(
-            self._model.eq_data[index][0]
-        )
+        return {joints[k]: powers for k, powers in coupled if any(powers)}, data[0]
 
     def _bodies(self, index: int) -> tuple[int, int]:
         ends = (int(self._model.eq_obj1id[index]), int(self._model.eq_obj2id[index]))
@@ -123,8 +122,6 @@ class Equalities:
         one_axis = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
         if any(self._model.jnt_type[joint] not in one_axis for joint in ends):
             return "they couple joints of several degrees of freedom"
-        if len(ends) > 1 and self._model.eq_data[index][2:5].any():
-            return "they couple joints by a curve"
         return ""
 
     def _closure(self, index: int, name: str) -> Closure:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise import _core
+from linkwise._core import InputError
 from linkwise.base import Array
 from linkwise.loads.members import each_member
-from linkwise.loads.samples import external, model_of, need_whole, rows
+from linkwise.loads.samples import dof_rows, external, model_of, need_whole, rows
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,7 +48,9 @@ def _recorded_works(run: RunLike) -> dict[str, Array] | None:
     run holds none."""
     if any(name not in run.dataset for name in _RECORDED):
         return None
-    drive, outside, dissipated = (rows(run, name, slice(None)) for name in _RECORDED)
+    everything = slice(None)
+    drive = dof_rows(run, "drive_work", everything)
+    outside, dissipated = (rows(run, name, everything) for name in _RECORDED[1:])
     works = {"drive_work": drive.sum(axis=1), "external_work": outside, "dissipated": dissipated}
     if not all(np.isfinite(work).all() for work in works.values()):
         return None
@@ -58,6 +61,11 @@ def _sampled_works(run: RunLike, model: Model) -> dict[str, Array]:
     """The same from the powers at the samples, by Simpson's rule."""
     from scipy.integrate import cumulative_simpson
 
+    if model.n_loops:
+        raise InputError(
+            "run holds no work, and of machines with closed loops it is not found from samples; "
+            "record work"
+        )
     times = run.dataset["time"].values
     everything = slice(None)
     q, v = rows(run, "position", everything), rows(run, "velocity", everything)

@@ -10,7 +10,7 @@ import numpy as np
 from linkwise.base import DERIVED, AnyArray, Array, lengths
 from linkwise.loads.extremes import what_samples_miss
 from linkwise.loads.members import each_member
-from linkwise.loads.samples import Selection, joint_names, model_of, need, rows, select
+from linkwise.loads.samples import Selection, dof_rows, joint_names, model_of, need, rows, select
 from linkwise.record.schema import DETERMINATE
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def has_power(run: RunLike) -> bool:
 
 def drive_power(run: RunLike, found: Selection, where: slice) -> Array:
     """Power of each joint's drive (time, joint) [W]."""
-    each = rows(run, "drive_torque", where) * rows(run, "velocity", where)
+    each = dof_rows(run, "drive_torque", where) * dof_rows(run, "velocity", where)
     power = np.zeros((len(each), found.joints.size))
     np.add.at(power.T, found.owner, each.T)
     return power
@@ -168,7 +168,7 @@ def _drive_energy(run: RunLike, found: Selection, power: Array) -> tuple[Array, 
     from scipy.integrate import cumulative_simpson
 
     if "drive_work" in run.dataset:
-        each = rows(run, "drive_work", slice(None))
+        each = dof_rows(run, "drive_work", slice(None))
         energy = np.zeros_like(power)
         np.add.at(energy.T, found.owner, (each - each[0]).T)
         return energy, "along the integration's own steps"

@@ -8,7 +8,7 @@ import numpy as np
 
 from linkwise.base import Array
 from linkwise.loads.extremes import extremes_of
-from linkwise.loads.samples import blocks, rows
+from linkwise.loads.samples import blocks, dof_rows
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -21,6 +21,7 @@ def _limited(run: RunLike, model: Model) -> list[tuple[str, int, float, float]]:
     sizes = dict(zip(model.joint_names, model.joint_nq, strict=True))
     free = model.limit_stiffness == 0
     low, high = model.lower_limit, model.upper_limit
+    loops = dict(zip(model.loop_names, model.loop_slices, strict=True))
     found, first = [], 0
     for name in names:
         if name not in sizes:  # it closes a loop, and has no part in q
@@ -34,7 +35,21 @@ def _limited(run: RunLike, model: Model) -> list[tuple[str, int, float, float]]:
             ]
         first += sizes[name]
     # Nothing is known of joints that the run does not name.
-    return found if first == run.dataset["position"].shape[1] else []
+    if first != run.dataset["position"].shape[1]:
+        return []
+    if "loop_position" not in run.dataset:
+        return found
+    free = model.loop_property("limit_stiffness") == 0
+    low, high = model.loop_property("lower"), model.loop_property("upper")
+    for name, (q, v) in loops.items():
+        dofs = range(v.start, v.stop)
+        if len(dofs) == q.stop - q.start:
+            found += [
+                (name, first + q.start + k, float(low[dof]), float(high[dof]))
+                for k, dof in enumerate(dofs)
+                if free[dof] and np.isfinite([low[dof], high[dof]]).any()
+            ]
+    return found
 
 
 def beyond_limits(run: RunLike) -> list[dict[str, Any]]:
@@ -58,7 +73,7 @@ def beyond_limits(run: RunLike) -> list[dict[str, Any]]:
         farthest[beyond], worst[beyond] = q[worst_end][beyond], past[worst_end][beyond]
     times: Array = run.dataset["time"].values
     for where in blocks(run, 8 * run.dataset["position"].shape[1]):
-        q = rows(run, "position", where)[:, columns]
+        q = dof_rows(run, "position", where)[:, columns]
         past = np.maximum(lower - q, q - upper)
         first_time = times[where][(past > 0).argmax(axis=0)]
         out = (past > 0).any(axis=0)

@@ -156,7 +156,9 @@ class Selection:
 def select(run: RunLike, model: Model) -> Selection:
     where = {name: k for k, name in enumerate([*model.joint_names, *model.loop_names])}
     joints = np.array([where[name] for name in joint_names(run)], dtype=np.intp)
-    of_each = [*model.joint_nv, *(0 for _ in model.loop_names)]  # loops have no drives
+    driven = "loop_drive_torque" in run.dataset
+    of_loops = [v.stop - v.start if driven else 0 for _, v in model.loop_slices]
+    of_each = [*model.joint_nv, *of_loops]
     nv = np.asarray(of_each, dtype=np.intp)[joints]
     return Selection(model, joints, np.repeat(np.arange(joints.size), nv))
 
@@ -177,6 +179,12 @@ def need_whole(run: RunLike, model: Model, *names: str) -> Selection:
 def blocks(run: RunLike, row_bytes: int) -> Iterator[slice]:
     """Slices of time whose rows fit into memory."""
     return base.blocks(run.dataset.sizes["time"], row_bytes)
+
+
+def dof_rows(run: RunLike, name: str, where: slice) -> Array:
+    """A variable's rows (time, dof), those of joints that close loops behind those of the tree."""
+    tree, loops = rows(run, name, where), f"loop_{name}"
+    return np.concatenate([tree, rows(run, loops, where)], -1) if loops in run.dataset else tree
 
 
 def rows(run: RunLike, name: str, where: slice | Sequence[int]) -> Array:

@@ -50,6 +50,17 @@ def _collect(rows: list[tuple[str, str, int]]) -> Scalars:
     return Scalars(text_array(labels), text_array(units), np.array(index, dtype=np.intp))
 
 
+def loop_scalars(model: Model) -> tuple[Scalars, Scalars]:
+    """Coordinates and velocities of all joints that close loops; rods and fixed ones have none."""
+    positions: list[tuple[str, str, int]] = []
+    velocities: list[tuple[str, str, int]] = []
+    for loop, (name, (q, v)) in enumerate(zip(model.loop_names, model.loop_slices, strict=True)):
+        coordinates, rates = model.loop_labels(loop)
+        positions += _rows(name, q.start, coordinates[: q.stop - q.start])
+        velocities += _rows(name, v.start, rates[: v.stop - v.start])
+    return _collect(positions), _collect(velocities)
+
+
 def joint_scalars(model: Model, joints: Sequence[int]) -> tuple[Scalars, Scalars]:
     """Coordinates and velocities of the joints given by index, in that order."""
     names = model.joint_names

@@ -16,7 +16,7 @@ from linkwise._core import quantities as recorded_quantities
 from linkwise.base import COMPONENTS, AnyArray
 from linkwise.io.complaint import shown
 from linkwise.record.extremes import ExtremesLayout, extremes_layout, labels
-from linkwise.record.labels import Scalars, joint_scalars, text_array
+from linkwise.record.labels import Scalars, joint_scalars, loop_scalars, text_array
 from linkwise.record.variable import Variable
 
 if TYPE_CHECKING:
@@ -27,10 +27,14 @@ TABLE = recorded_quantities()
 QUANTITIES = tuple(dict.fromkeys(row["group"] for row in TABLE))
 
 
+#: Axes of what is recorded of joints that close loops, and the names of their dimensions.
+LOOP_AXES = {"loop_coordinates": "loop_coordinate", "loop_rates": "loop_dof"}
+
+
 def _attrs(row: Mapping[str, Any]) -> dict[str, str]:
     """The texts of a quantity; the units of joint coordinates are found per joint."""
     keys = ("long_name", "units", "frame", "point", "convention")
-    per_joint = row["axis"] in ("coordinates", "rates")
+    per_joint = row["axis"] in ("coordinates", "rates", "terms", *LOOP_AXES)
     return {key: row[key] for key in keys if row[key] and not (key == "units" and per_joint)}
 
 
@@ -180,6 +184,45 @@ def _joint_variables(
     return variables, coordinates
 
 
+def _loop_variables(
+    model: Model, rows: Sequence[Mapping[str, Any]], coordinates: dict[str, Coordinate]
+) -> list[Variable]:
+    """Coordinates, rates and drives of joints that close loops, with their labels."""
+    positions, velocities = loop_scalars(model)
+    variables = []
+    for row in rows:
+        dim = LOOP_AXES[row["axis"]]
+        scalars = positions if row["axis"] == "loop_coordinates" else velocities
+        whole = int(scalars.index.size)
+        if not whole:
+            continue
+        variables.append(_scalar_variable(row, dim, scalars, whole, coordinates))
+        coordinates[dim] = Coordinate((dim,), scalars.labels)
+    return variables
+
+
+def _coupling_variables(
+    model: Model, rows: Sequence[Mapping[str, Any]], coordinates: dict[str, Coordinate]
+) -> list[Variable]:
+    """What couplings put into their joints, labelled "coupling:joint"."""
+    unit_of: dict[str, str] = {}
+    for found in _all_positions(model):
+        unit_of |= dict(zip(found.labels.tolist(), found.units.tolist(), strict=True))
+    pairs = [
+        (f"{name}:{joint}", unit_of[joint])
+        for name, joints in zip(model.coupling_names, model.coupling_joints, strict=True)
+        for joint in joints
+    ]
+    named, units = (text_array(column) for column in zip(*pairs, strict=True))
+    coordinates["coupled"] = Coordinate(("coupled",), named)
+    scalars = Scalars(named, units, np.arange(len(pairs)))
+    return [_scalar_variable(row, "coupled", scalars, len(pairs), coordinates) for row in rows]
+
+
+def _all_positions(model: Model) -> tuple[Scalars, Scalars]:
+    return joint_scalars(model, range(model.n_joints))[0], loop_scalars(model)[0]
+
+
 def _body_variables(
     model: Model,
     rows: Sequence[Mapping[str, Any]],
@@ -234,6 +277,12 @@ def build_schema(
     of_joints = [row for row in rows if row["axis"] in ("coordinates", "rates", "joints")]
     if of_joints:  # labels of a million joints take seconds
         variables, coordinates = _joint_variables(model, of_joints, selected)
+    if model.n_loops and len(selected) == model.n_joints:
+        of_loops = [row for row in rows if row["axis"] in LOOP_AXES]
+        variables += _loop_variables(model, of_loops, coordinates)
+    if model.coupling_names and len(selected) == model.n_joints:
+        of_couplings = [row for row in rows if row["axis"] == "terms"]
+        variables += _coupling_variables(model, of_couplings, coordinates)
     of_bodies = [row for row in rows if row["axis"] == "bodies"]
     if of_bodies:
         variables += _body_variables(model, of_bodies, wrenched, coordinates)

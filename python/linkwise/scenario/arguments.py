@@ -113,11 +113,7 @@ class ArgumentBuilder:
         self, section: JointSection, keys: tuple[str, str]
     ) -> dict[str, npt.NDArray[np.float64]]:
         joint = keys[1]
-        if joint in self.loop_names:
-            _, rates = self.model.loop_labels(self.loop_names[joint])
-            units = [unit for _, unit in rates]
-        else:
-            units = self._units(joint, keys, positions=False)
+        units = self._units(joint, keys, positions=False)
         return {
             name: self._fit(
                 value if isinstance(value, list) else [value] * len(units),
@@ -144,6 +140,7 @@ class ArgumentBuilder:
             state = np.array(model.initial_configuration()) if position else np.zeros(model.nv)
         for joint, values in given.items():
             keys = ("initial", key, joint)
+            self._check_joint(joint, keys)
             units = self._units(joint, keys, positions=position)
             numbers = self._fit(values, units, keys, _KINDS[key])
             if "1" in units:
@@ -399,7 +396,7 @@ class ArgumentBuilder:
             if joint in self.loop_names:
                 self.source.complain(
                     keys,
-                    f"joint '{shorten(joint)}' closes a loop: it moves as the others do",
+                    f"joint '{shorten(joint)}' closes a loop: this follows from the other joints",
                     "name a joint of the tree",
                 )
             remedy = near(joint, self.joint_names, "the joints are")
@@ -407,7 +404,10 @@ class ArgumentBuilder:
         return self.joint_names[joint]
 
     def _units(self, joint: str, keys: Sequence[str], *, positions: bool) -> list[str]:
-        """Per coordinate or velocity of a joint "rad", "m", "1" or "rad or m"."""
+        """Per coordinate or velocity of any joint "rad", "m", "1" or "rad or m"."""
+        if joint in self.loop_names:
+            labels = self.model.loop_labels(self.loop_names[joint])
+            return [unit for _, unit in labels[0 if positions else 1]]
         index = self._check_joint(joint, keys)
         coordinates, velocities = joint_scalars(self.model, [index])
         return [str(u) for u in (coordinates if positions else velocities).units]

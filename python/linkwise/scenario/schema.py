@@ -365,9 +365,13 @@ class PointSpringSection(Section):
 
 
 class CouplingSection(Section):
-    """Coordinates tied together: the sum of factor times coordinate is offset, in SI units."""
+    """Coordinates tied together: the sum of factor times coordinate is offset, in SI units; a list
+    of factors is that of a polynomial without a constant."""
 
-    factors: Annotated[dict[str, Number], Field(min_length=1)]
+    factors: Annotated[
+        dict[str, Number | Annotated[list[Number], Field(min_length=1, max_length=4)]],
+        Field(min_length=1),
+    ]
     offset: Number = 0.0
 
 

@@ -75,7 +75,7 @@ def check_driven(
         if given is not None and not isinstance(given, Mapping):
             raise InputError(f"{name}: {shown(given)} given; give a dictionary by name")
     for joint, drive in (drives or {}).items():
-        model.joint_index(joint)
+        model.load_index(joint)
         try:
             by_joint[joint] = as_drive(drive)
         except InputError as error:
@@ -122,8 +122,7 @@ def set_driven(
             drive.check(model, joint, end)
             span = None
             if start is not None:
-                q, v = model.q_slice(joint), model.v_slice(joint)
-                span = Span(end, start[0][q].copy(), start[1][v].copy())
+                span = Span(end, *_joint_state(model, joint, start))
             drive.apply(simulation, joint, span)
         except InputError as error:
             raise InputError(f"drives[{shown(joint)}]: {error}") from None
@@ -135,6 +134,17 @@ def set_driven(
             raise InputError(f"wrenches[{shown(name)}]: {error}") from None
         notes += [Ignored("", f"wrenches[{name!r}]", note) for note in wrench.notes(end)]
     return _each_once(notes)
+
+
+def _joint_state(model: Model, joint: str, start: tuple[Array, Array]) -> tuple[Array, Array]:
+    """A joint's own coordinates and rates at a state of the tree."""
+    loop = model.load_index(joint) - model.n_joints
+    if loop < 0:
+        q, v = model.q_slice(joint), model.v_slice(joint)
+        return start[0][q].copy(), start[1][v].copy()
+    q, v = model.loop_slices[loop]
+    coordinates, rates = _core.loop_coordinates(model, *start)
+    return coordinates[q], rates[v]
 
 
 _MOST_NAMED = 3  # drives of which the same is said

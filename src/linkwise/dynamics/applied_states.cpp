@@ -7,7 +7,7 @@
 #include "linkwise/base/error.hpp"
 #include "linkwise/forces/drive.hpp"
 #include "linkwise/forces/passive.hpp"
-#include "linkwise/kinematics/loop_states.hpp"
+#include "linkwise/kinematics/coupling_states.hpp"
 
 namespace linkwise {
 
@@ -43,13 +43,15 @@ class AppliedStates::Loops {
         several_(first + count > 1),
         first_(first) {}
 
-  void add(size_t i, SweepInput<double>& in) {
+  void add(size_t i, const double* tau, SweepInput<double>& in) {
     states_.update(in);
     const std::string where = several_ ? "state " + std::to_string(first_ + i) + ": " : "";
     require_closed(model_, states_, where);
-    require_coupled(model_, in.q, in.v, where);
+    require_coupled(model_, states_, in.q, in.v, where);
+    in.loop_tau = tau;
     if (!passive_) return;
     tau_.assign(model_.loops.nv, 0.0);
+    if (tau) std::copy_n(tau, tau_.size(), tau_.begin());
     add_passive_forces(model_.loops, states_.q().data(), states_.v().data(), tau_.data());
     in.loop_tau = tau_.data();
   }
@@ -85,7 +87,7 @@ SweepInput<double> AppliedStates::operator[](size_t i) {
   in.external = row.external;
   in.prescribed = row.du;
   in.gravity_factor = row.gravity_factor;
-  if (loops_) loops_->add(i, in);
+  if (loops_) loops_->add(i, row.loop_tau, in);
   return in;
 }
 

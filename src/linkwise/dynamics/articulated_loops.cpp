@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/forces/armature_bias.hpp"
+#include "linkwise/kinematics/coupling_states.hpp"
 
 namespace linkwise {
 namespace {
@@ -55,26 +57,18 @@ Compliance<double> yielding(const Model& model, int body, const Transform<double
   return invert_inertia(M);
 }
 
-/// Neither rotors nor given motion: both would be rows of their own.
-void require_free_joints(const Model& model) {
-  const auto& armature = model.loops.dof[static_cast<int>(DofProperty::armature)];
-  for (const LoopJoint& loop : model.loops.joints)
-    for (const Element& e : stack_of(model, loop)) {
-      const bool rotor = std::any_of(armature.begin() + e.v, armature.begin() + e.v + e.nv,
-                                     [](double x) { return x > 0; });
-      if (rotor || e.prescribed)
-        throw InputError("joint '" + loop.joint.name + "'" + model.where() + " closes a loop and " +
-                         (rotor ? "has an armature" : "has a given motion") +
-                         "; give that to another joint of the loop");
-    }
-}
-
 /// Of each term the column of its joint's P, or -1 where its motion is given. InputError where all
 /// are given.
 std::vector<int> terms_of(const Model& model, const Coupling& coupling) {
   std::vector<int> columns;
   bool any = false;
   for (const Coupling::Term& term : coupling.terms) {
+    if (term.closes) {
+      const JointInfo& joint = model.joint_at(term.joint);
+      columns.push_back(model.loops.elements[joint.first_element].prescribed ? -1 : 0);
+      any |= columns.back() == 0;
+      continue;
+    }
     const BodyTopology& body = model.topology[term.body];
     int column = 0, found = -1;
     for (int i = 0; i < body.n_elements; ++i) {
@@ -97,8 +91,11 @@ Force<double> direction(const Vector6<double>& Q) { return to_force(Q.data()); }
 }  // namespace
 
 ArticulatedLoops::ArticulatedLoops(const Model& model)
-    : model_(model), sweeps_(model), states_(model), groups_(make_loop_groups(model)) {
-  require_free_joints(model);
+    : model_(model),
+      sweeps_(model),
+      states_(model),
+      groups_(make_loop_groups(model)),
+      has_bias_(has_armature_bias(model.loops)) {
   for (const Coupling& coupling : model.couplings) terms_.push_back(terms_of(model, coupling));
   work_.resize(groups_.size());
   for (size_t g = 0; g < groups_.size(); ++g) {
@@ -158,7 +155,7 @@ bool ArticulatedLoops::evaluate(const SweepInput<double>& in, double* du, double
     if (failed_body() >= 0) return false;
     for (int g = stage.first_group; g < stage.last_group; ++g) {
       carry(in, g);
-      factor(g, with_loads);
+      factor(in, g, with_loads);
       if (groups_[g].top >= 0) reduce_top(g);
     }
   }
@@ -169,7 +166,7 @@ bool ArticulatedLoops::evaluate(const SweepInput<double>& in, double* du, double
   }
   if (!loads) return true;
   sweeps_.store_loads(in.q, loads);
-  store_loop_loads(in, loads + 6 * model_.n_joints());
+  store_loop_loads(loads + 6 * model_.n_joints());
   return true;
 }
 
@@ -188,7 +185,7 @@ void ArticulatedLoops::place_forces(const SweepInput<double>& in, int g) {
     }
     const LoopState& loop = states_[member.loop];
     for (int i = 0; i < member.n_rows; ++i) {
-      const Force<double> Q = direction(loop.basis.Q[i]);
+      const Force<double> Q = direction(loop.row[i]);
       const auto add = [&](int at, const Force<double>& wrench) {
         (at >= 0 ? w.columns[at + i].F : w.Psi[-1 - at + i]) += wrench;
       };
@@ -200,26 +197,45 @@ void ArticulatedLoops::place_forces(const SweepInput<double>& in, int g) {
   }
 }
 
-/// A torque in each joint. The row is the sum of factors times accelerations, of which those of
-/// given motions are known.
+/// A torque in each joint. The row is the sum of slopes times accelerations, of which those of
+/// given motions are known; in a joint that closes a loop it is a wrench on both bodies, and the
+/// acceleration is P^+ (that of F less that of E) less P^+ c.
 void ArticulatedLoops::place_coupling(const SweepInput<double>& in, int g,
                                       const LoopGroup::Member& member) {
   Work& w = work_[g];
   const Coupling& coupling = model_.couplings[member.coupling];
-  double known = 0, size = 0;
+  const CoupledState at = coupled_state(in.q, in.v, states_);
+  double asked = -miss_of(coupling, at).bend, size = std::abs(asked);
+  size_t end = 0;
+  const auto add = [&](const Force<double>& wrench) {
+    const int to = member.at[end++];
+    (to >= 0 ? w.columns[to].F : w.Psi[-1 - to]) += wrench;
+  };
   for (size_t t = 0; t < coupling.terms.size(); ++t) {
     const Coupling::Term& term = coupling.terms[t];
     const int k = terms_[member.coupling][t];
-    if (k >= 0) {
-      w.columns[member.at[t]].z[k] += term.factor;
-    } else if (in.prescribed) {
-      known += term.factor * in.prescribed[term.v];
-      size += std::abs(term.factor * in.prescribed[term.v]);
+    const double slope = term.slope(at.position(term));
+    double known = 0;
+    if (k < 0) {
+      const double* given = term.closes ? in.loop_du : in.prescribed;
+      known = given ? slope * given[term.v] : 0;
+      end += term.closes ? 2 : 1;
+    } else if (term.closes) {
+      const LoopState& loop = states_[term.joint - model_.n_joints()];
+      const Force<double> along = direction(loop.basis.dual[0]);
+      const Force<double> pull{slope * along.lin, slope * along.ang};
+      add(wrench_on_a(loop, pull));
+      add(wrench_on_b(model_.loops.joints[term.joint - model_.n_joints()], pull));
+      known = -slope * loop.bias;
+    } else {
+      w.columns[member.at[end++]].z[k] += slope;
     }
+    asked -= known;
+    size += std::abs(known);
   }
-  if (asked_) known = -asked_[6 * model_.n_loops() + member.coupling];
-  w.r[member.row] = -known;
-  w.size[member.row] = size;
+  if (asked_) asked = asked_[6 * model_.n_loops() + member.coupling];
+  w.r[member.row] = asked;
+  w.size[member.row] = asked_ ? std::abs(asked) : size;
 }
 
 void ArticulatedLoops::carry(const SweepInput<double>& in, int g) {
@@ -243,34 +259,38 @@ void ArticulatedLoops::carry(const SweepInput<double>& in, int g) {
       (to >= 0 ? w.columns[to].F : w.Psi[-1 - to]) += columns[i].at_parent;
     }
   }
+  for (const auto& member : group.members)
+    for (int i = member.row; member.loop >= 0 && i < member.row + member.n_rows; ++i)
+      system.row(i)[i] += states_[member.loop].yields[i - member.row];
 }
 
 /// D, and the factor of Lambda in coordinates in which D is 1.
-void ArticulatedLoops::factor(int g, bool with_loads) {
+void ArticulatedLoops::factor(const SweepInput<double>& in, int g, bool with_loads) {
   const LoopGroup& group = groups_[g];
   LoopSystem& system = systems_[g];
   for (size_t m = 0; m < group.members.size(); ++m) {
     const auto& member = group.members[m];
     double* const D = system.metric(m);
     if (member.coupling >= 0) {
-      D[0] = yielding_of(member);
+      D[0] = yielding_of(in, member);
       continue;
     }
     const LoopState& loop = states_[member.loop];
     Force<double> on_a[6], on_b[6];
     for (int i = 0; i < member.n_rows; ++i) {
-      const Force<double> Q = direction(loop.basis.Q[i]);
+      const Force<double> Q = direction(loop.row[i]);
       on_a[i] = wrench_on_a(loop, Q);
       on_b[i] = wrench_on_b(model_.loops.joints[member.loop], Q);
       const Motion<double> a = compliance_a_[member.loop] * on_a[i],
                            b = compliance_b_[member.loop] * on_b[i];
       for (int j = 0; j <= i; ++j) D[packed(i, j)] = dot(a, on_a[j]) + dot(b, on_b[j]);
+      D[packed(i, i)] += loop.yields[i];
     }
   }
   system.factor(null_, with_loads);
-  report_.rows += group.rows;
-  report_.rank += system.rank();
-  report_.strong += system.rank_above(weak_pivot);
+  report_.rows += group.rows - group.rotors;
+  report_.rank += system.rank() - group.rotors;
+  report_.strong += system.rank_above(weak_pivot) - group.rotors;
   report_.smallest_pivot = std::min(report_.smallest_pivot, system.smallest_pivot());
 }
 
@@ -321,14 +341,22 @@ void ArticulatedLoops::solve_forces(const SweepInput<double>& in, int g, bool wi
   }
 }
 
+/// What is given, less what rotors of turning rates take by themselves.
 void ArticulatedLoops::add_known_wrenches(const SweepInput<double>& in) {
-  if (!in.loop_tau) return;
+  known_tau_ = in.loop_tau;
+  if (has_bias_ && in.v) {
+    tau_.assign(model_.loops.nv, 0.0);
+    if (in.loop_tau) std::copy_n(in.loop_tau, tau_.size(), tau_.begin());
+    add_armature_bias(model_.loops, states_.v().data(), -1, tau_.data());
+    known_tau_ = tau_.data();
+  }
+  if (!known_tau_) return;
   for (int l = 0; l < model_.n_loops(); ++l) {
     const LoopState& loop = states_[l];
     Force<double> w;
     for (int k = 0; k < loop.basis.n; ++k) {
       const Force<double> dual = direction(loop.basis.dual[k]);
-      const double tau = in.loop_tau[loop.dof[k]];
+      const double tau = known_tau_[loop.dof[k]];
       w += Force<double>{tau * dual.lin, tau * dual.ang};
     }
     const LoopJoint& at = model_.loops.joints[l];
@@ -338,24 +366,70 @@ void ArticulatedLoops::add_known_wrenches(const SweepInput<double>& in) {
 }
 
 /// D of a coupling: what its joints yield to it, each alone.
-double ArticulatedLoops::yielding_of(const LoopGroup::Member& member) const {
+double ArticulatedLoops::yielding_of(const SweepInput<double>& in,
+                                     const LoopGroup::Member& member) const {
   const Coupling& coupling = model_.couplings[member.coupling];
+  const CoupledState at = coupled_state(in.q, in.v, states_);
   double sum = 0;
   for (size_t t = 0; t < coupling.terms.size(); ++t) {
     const int k = terms_[member.coupling][t];
     const Coupling::Term& term = coupling.terms[t];
-    if (k >= 0) sum += term.factor * term.factor * sweeps_.yielding(term.body, k);
+    const double slope = term.slope(at.position(term));
+    if (k < 0) continue;
+    double yields = 0;
+    if (term.closes) {
+      const int l = term.joint - model_.n_joints();
+      const Force<double> along = direction(states_[l].basis.dual[0]);
+      const Force<double> on_a = wrench_on_a(states_[l], along),
+                          on_b = wrench_on_b(model_.loops.joints[l], along);
+      yields = dot(compliance_a_[l] * on_a, on_a) + dot(compliance_b_[l] * on_b, on_b);
+    } else {
+      yields = sweeps_.yielding(term.body, k);
+    }
+    sum += slope * slope * yields;
   }
-  return sum;
+  return sum > 0 ? sum : 1;  // a coupling of powers alone holds nothing at zero
 }
 
 /// Wrenches of the joints of a group on their children.
 void ArticulatedLoops::add_to_load(int g, const double* f, std::vector<Force<double>>& load) const {
-  for (const auto& member : groups_[g].members)
+  for (const auto& member : groups_[g].members) {
+    if (member.coupling >= 0) add_coupling_to_load(member, f[member.row], load);
     for (int i = 0; member.loop >= 0 && i < member.n_rows; ++i) {
-      const Force<double> Q = direction(states_[member.loop].basis.Q[i]);
+      const Force<double> Q = direction(states_[member.loop].row[i]);
       const double x = f[member.row + i];
       load[member.loop] += Force<double>{x * Q.lin, x * Q.ang};
+    }
+  }
+}
+
+/// What a coupling puts into joints that close loops.
+void ArticulatedLoops::add_coupling_to_load(const LoopGroup::Member& member, double f,
+                                            std::vector<Force<double>>& load) const {
+  const Coupling& coupling = model_.couplings[member.coupling];
+  for (size_t t = 0; t < coupling.terms.size(); ++t) {
+    const Coupling::Term& term = coupling.terms[t];
+    if (!term.closes || terms_[member.coupling][t] < 0) continue;
+    const int l = term.joint - model_.n_joints();
+    const Force<double> along = direction(states_[l].basis.dual[0]);
+    const double torque = f * term.slope(states_.q()[term.q]);
+    load[l] += Force<double>{torque * along.lin, torque * along.ang};
+  }
+}
+
+void ArticulatedLoops::coupling_loads(const double* q, std::vector<double>& loads) const {
+  std::vector<size_t> first(1);
+  for (const Coupling& coupling : model_.couplings)
+    first.push_back(first.back() + coupling.terms.size());
+  loads.assign(first.back(), 0.0);
+  const CoupledState at{q, nullptr, states_.q().data(), nullptr};
+  for (size_t g = 0; g < groups_.size(); ++g)
+    for (const auto& member : groups_[g].members) {
+      if (member.coupling < 0) continue;
+      const Coupling& coupling = model_.couplings[member.coupling];
+      for (size_t t = 0; t < coupling.terms.size(); ++t)
+        loads[first[member.coupling] + t] =
+            work_[g].f[member.row] * coupling.terms[t].slope(at.position(coupling.terms[t]));
     }
 }
 
@@ -365,16 +439,16 @@ void ArticulatedLoops::store_loop_load(int l, const Force<double>& w, double* lo
   std::copy(user.begin(), user.end(), loads + 6 * l);
 }
 
-void ArticulatedLoops::store_loop_loads(const SweepInput<double>& in, double* loads) {
+void ArticulatedLoops::store_loop_loads(double* loads) {
   std::vector<Force<double>>& load = load_;
   load.assign(model_.n_loops(), {});
   for (int g = 0; g < static_cast<int>(groups_.size()); ++g)
     add_to_load(g, work_[g].f.data(), load);
   for (int l = 0; l < model_.n_loops(); ++l) {
     const LoopState& loop = states_[l];
-    for (int k = 0; in.loop_tau && k < loop.basis.n; ++k) {
+    for (int k = 0; known_tau_ && k < loop.basis.n; ++k) {
       const Force<double> dual = direction(loop.basis.dual[k]);
-      const double tau = in.loop_tau[loop.dof[k]];
+      const double tau = known_tau_[loop.dof[k]];
       load[l] += Force<double>{tau * dual.lin, tau * dual.ang};
     }
     store_loop_load(l, load[l], loads);

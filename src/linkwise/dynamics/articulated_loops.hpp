@@ -32,6 +32,10 @@ class ArticulatedLoops {
   /// directions that hold less than `null` of what the strongest does.
   bool respond(const double* q, const double* asked, double null, double* du);
 
+  /// Of the last evaluation: the torque or force that each coupling puts into each of its joints,
+  /// in the order of the model's couplings and their terms.
+  void coupling_loads(const double* q, std::vector<double>& loads) const;
+
   int failed_body() const { return sweeps_.failed_body(); }
   const LoopReport& report() const { return report_; }
   const LoopStates& states() const { return states_; }
@@ -55,13 +59,15 @@ class ArticulatedLoops {
   void carry(const SweepInput<double>& in, int g);
   void place_forces(const SweepInput<double>& in, int g);
   void place_coupling(const SweepInput<double>& in, int g, const LoopGroup::Member& member);
-  double yielding_of(const LoopGroup::Member& member) const;
-  void factor(int g, bool with_loads);
+  double yielding_of(const SweepInput<double>& in, const LoopGroup::Member& member) const;
+  void factor(const SweepInput<double>& in, int g, bool with_loads);
   void reduce_top(int g);
   void solve_forces(const SweepInput<double>& in, int g, bool with_loads);
   void add_known_wrenches(const SweepInput<double>& in);
   void add_to_load(int g, const double* f, std::vector<Force<double>>& load) const;
-  void store_loop_loads(const SweepInput<double>& in, double* loads);
+  void store_loop_loads(double* loads);
+  void add_coupling_to_load(const LoopGroup::Member& member, double f,
+                            std::vector<Force<double>>& load) const;
   void store_loop_load(int l, const Force<double>& w, double* loads) const;
 
   const Model& model_;
@@ -84,6 +90,9 @@ class ArticulatedLoops {
   const double* asked_ = nullptr;  ///< in place of what rates ask for
   double null_ = 0;                ///< pivots of the scaled Lambda below this are zero
   std::vector<double> at_rest_;
+  bool has_bias_;  ///< of rotors on loop joints
+  std::vector<double> tau_;
+  const double* known_tau_ = nullptr;  ///< [nv] of loop joints, in the last evaluation
 };
 
 }  // namespace linkwise

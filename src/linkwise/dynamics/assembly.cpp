@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/dynamics/loop_projection.hpp"
+#include "linkwise/kinematics/coupling_states.hpp"
 
 namespace linkwise {
 namespace {
@@ -116,15 +116,46 @@ int widest(const Model& model, const LoopStates& states, bool of_rates) {
   return worst;
 }
 
+/// "motions of 'a' and 'c' contradict each other through loop joint 'x'", of joints of given motion
+/// whose loops are one group with it; empty: there are none.
+std::string contradiction(const Model& model, const LoopStates& states, int l) {
+  std::vector<std::string> given;
+  const auto add = [&](const JointInfo& joint, const std::vector<Element>& elements) {
+    if (joint.n_elements > 0 && elements[joint.first_element].prescribed)
+      given.push_back("'" + joint.name + "'");
+  };
+  const auto in_loop = [&](int body) {
+    for (const auto* path : {&states.path(l).to_a, &states.path(l).to_b})
+      if (std::find(path->begin(), path->end(), body) != path->end()) return true;
+    return false;
+  };
+  for (const JointInfo& joint : model.joints)
+    if (in_loop(joint.body)) add(joint, model.elements);
+  add(model.loops.joints[l].joint, model.loops.elements);
+  if (given.empty()) return "";
+  std::string text = given.size() == 1 ? "motion of " : "motions of ";
+  for (size_t k = 0; k < given.size(); ++k)
+    text += (k == 0 ? "" : k + 1 < given.size() ? ", " : " and ") + given[k];
+  return text + (given.size() == 1 ? " contradicts" : " contradict each other through") +
+         " the loop that joint '" + model.loops.joints[l].joint.name + "'" + model.where() +
+         " closes";
+}
+
 [[noreturn]] void refuse_position(const Model& model, const LoopStates& states,
                                   const std::vector<double>& q) {
-  require_coupled(model, q.data(), nullptr, "");
+  require_coupled(model, states, q.data(), nullptr);
   const int l = widest(model, states, false);
   const LoopJoint& loop = model.loops.joints[l];
   const LoopMiss miss = miss_of(states[l], states[l].gap);
   const auto link = [&](int k) {
     return k >= 0 ? "'" + model.links[k].name + "'" : std::string("the ground");
   };
+  const std::string given = contradiction(model, states, l);
+  if (!given.empty())
+    throw InputError(given + ": at best it is open by " + rounded(1e3 * miss.shift) + " mm and " +
+                     rounded(miss.turn) + " rad between " + link(loop.parent_link) + " and " +
+                     link(loop.joint.link) +
+                     "; drive one of them, hold fewer joints, or start from another position");
   throw InputError("joint '" + loop.joint.name + "'" + model.where() +
                    " cannot close its loop: at best it is open by " + rounded(1e3 * miss.shift) +
                    " mm and " + rounded(miss.turn) + " rad between " + link(loop.parent_link) +
@@ -165,19 +196,23 @@ void make_consistent(const Model& model, LoopProjection& loops, const std::vecto
   for (int k = 0; k < 3; ++k) left = loops.stop(q.data(), weakest[0], v.data());
   left = loops.slip(q.data(), v.data());
   if (left <= consistent * (1 + fastest)) return;
-  require_coupled(model, q.data(), v.data(), "");
+  require_coupled(model, loops.states(), q.data(), v.data());
   const int l = widest(model, loops.states(), true);
   const LoopMiss miss = miss_of(loops.states()[l], loops.states()[l].slip);
-  throw InputError("joint '" + model.loops.joints[l].joint.name + "'" + model.where() +
-                   " closes a loop whose given motions contradict each other, by " +
-                   rounded(miss.shift) + " m/s and " + rounded(miss.turn) +
-                   " rad/s; give fewer of them, or start where the machine can move");
+  const std::string given = contradiction(model, loops.states(), l);
+  throw InputError((given.empty()
+                        ? "joint '" + model.loops.joints[l].joint.name + "'" + model.where() +
+                              " closes a loop whose given motions "
+                              "contradict each other"
+                        : given) +
+                   ", by " + rounded(miss.shift) + " m/s and " + rounded(miss.turn) +
+                   " rad/s; drive one of them, or start where the machine can move");
 }
 
 }  // namespace
 
 Assembly assemble(const Model& model, std::vector<double> q, std::vector<double> v,
-                  const std::vector<std::string>& hold) {
+                  const std::vector<std::string>& hold, const LoopMotion& given) {
   for (const std::string& name : hold) model.joint_index(name);
   Assembly out;
   out.q = q;
@@ -187,6 +222,7 @@ Assembly assemble(const Model& model, std::vector<double> q, std::vector<double>
     const std::unique_ptr<const Model> held = n > 0 ? holding(model, hold, n) : nullptr;
     const Model& own = held ? *held : model;
     Closing closing(own);
+    closing.loops().give(given);
     out.gap = closing.loops().gap(q.data());
     out.q = q;
     const bool done = closing.close(out.q);
@@ -201,14 +237,16 @@ Assembly assemble(const Model& model, std::vector<double> q, std::vector<double>
 }
 
 void require_assembled(const Model& model, const std::vector<double>& q,
-                       const std::vector<double>& v) {
+                       const std::vector<double>& v, const LoopMotion& given) {
   LoopStates states(model);
   SweepInput<double> in;
   in.q = q.data();
   in.v = v.data();
+  in.loop_q = given.q;
+  in.loop_v = given.v;
   states.update(in);
   require_closed(model, states);
-  require_coupled(model, q.data(), v.data(), "");
+  require_coupled(model, states, q.data(), v.data());
 }
 
 }  // namespace linkwise

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "linkwise/model/model.hpp"
+#include "linkwise/dynamics/loop_projection.hpp"
 
 namespace linkwise {
 
@@ -17,14 +17,15 @@ struct Assembly {
 
 /// Newton's method from q [nq] on, each step of which takes the least change in the metric of the
 /// mass matrix; then rates of least change of kinetic energy from v [nv], empty: at rest. Joints of
-/// given motion and those in `hold` stay where they are; where loops do not close so, those of
-/// `hold` are released, the last one first. InputError where no position is found, with the loop
-/// and what is left open, and where rates that are given contradict each other.
+/// given motion and those in `hold` stay where they are, those that close loops where `given` says;
+/// where loops do not close so, those of `hold` are released, the last one first. InputError where
+/// no position is found, with the loop and what is left open, and where rates that are given
+/// contradict each other.
 Assembly assemble(const Model& model, std::vector<double> q, std::vector<double> v,
-                  const std::vector<std::string>& hold);
+                  const std::vector<std::string>& hold, const LoopMotion& given = {});
 
 /// InputError naming the loop where q and v leave one open.
 void require_assembled(const Model& model, const std::vector<double>& q,
-                       const std::vector<double>& v);
+                       const std::vector<double>& v, const LoopMotion& given = {});
 
 }  // namespace linkwise

@@ -14,6 +14,7 @@ struct BatchInput {
   const double* v = nullptr;
   const double* tau = nullptr;       ///< forward dynamics
   const double* du = nullptr;        ///< inverse dynamics; prescribed ones: forward dynamics
+  const double* loop_tau = nullptr;  ///< torques of loop joints; null: none
   const double* external = nullptr;  ///< [n_joints][6] per system
   double gravity_factor = 1;
   const double* passive = nullptr;  ///< loads by cause: the part of the torques that is no drive's

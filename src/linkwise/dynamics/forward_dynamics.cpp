@@ -85,11 +85,14 @@ class ClosedLoops : public DynamicsMethod {
       report.outcome = Outcome::singular_position;
     }
     report.loops = kernel_.report();
+    if (loads) kernel_.coupling_loads(in.q, coupling_load_);
     return report;
   }
+  std::span<const double> coupling_load() const override { return coupling_load_; }
 
  private:
   ArticulatedLoops kernel_;
+  std::vector<double> coupling_load_;
 };
 
 std::unique_ptr<DynamicsMethod> make_articulated_body(const Model& model,
@@ -145,6 +148,7 @@ class WithArmatureBias final : public DynamicsMethod {
     return method_->evaluate(t, with_bias, du, loads);
   }
   void accepted(double t) override { method_->accepted(t); }
+  std::span<const double> coupling_load() const override { return method_->coupling_load(); }
   std::span<const double> constraint_force() const override { return method_->constraint_force(); }
 
  private:

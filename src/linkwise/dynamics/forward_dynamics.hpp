@@ -39,6 +39,8 @@ class DynamicsMethod {
   virtual void accepted(double /*t*/) {}
   /// Unknowns of the last evaluation; empty for methods without constraint forces.
   virtual std::span<const double> constraint_force() const { return {}; }
+  /// Of the last evaluation: what couplings put into their joints, see ArticulatedLoops.
+  virtual std::span<const double> coupling_load() const { return {}; }
 };
 
 struct DynamicsEntry {

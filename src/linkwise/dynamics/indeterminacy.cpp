@@ -5,6 +5,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/articulated_loops.hpp"
+#include "linkwise/kinematics/coupling_states.hpp"
 
 namespace linkwise {
 namespace {
@@ -42,7 +43,7 @@ Indeterminacy find_indeterminacy(const Model& model, const double* q) {
   in.tau = zero.data();
   const bool regular = kernel.evaluate(in, du.data(), loads.data());
   require_closed(model, kernel.states());
-  require_coupled(model, q, nullptr);
+  require_coupled(model, kernel.states(), q, nullptr);
   if (!regular)
     throw InputError("body '" + model.body_name(kernel.failed_body()) + "'" + model.where() +
                      ": its articulated inertia is not positive definite; give it mass and "

@@ -31,6 +31,10 @@ void walk_inward(const Model& model, int body, int top, F&& f) {
   for (; body != top; body = model.topology[body].parent) f(body);
 }
 
+const LoopJoint& loop_of(const Model& model, const Coupling::Term& term) {
+  return model.loops.joints[term.joint - model.n_joints()];
+}
+
 /// Bodies on which the forces of a member act; -1: the ground.
 std::vector<int> ends_of(const Model& model, const LoopGroup::Member& member) {
   if (member.loop >= 0) {
@@ -38,17 +42,24 @@ std::vector<int> ends_of(const Model& model, const LoopGroup::Member& member) {
     return {loop.parent_body, loop.joint.body};
   }
   std::vector<int> ends;
-  for (const Coupling::Term& term : model.couplings[member.coupling].terms)
+  for (const Coupling::Term& term : model.couplings[member.coupling].terms) {
+    if (term.closes) ends.push_back(loop_of(model, term).parent_body);
     ends.push_back(term.body);
+  }
   return ends;
 }
 
-/// The innermost body that a member's paths start from. A coupling acts within joints, so its paths
-/// start inboard of them.
+/// The innermost body that a member's paths start from. A coupling acts within joints of the tree,
+/// so its paths start inboard of them.
 int top_of(const Model& model, const LoopGroup::Member& member) {
   std::vector<int> ends = ends_of(model, member);
-  if (member.coupling >= 0)
-    for (int& end : ends) end = model.topology[end].parent;
+  if (member.coupling >= 0) {
+    size_t at = 0;
+    for (const Coupling::Term& term : model.couplings[member.coupling].terms) {
+      if (!term.closes) ends[at] = model.topology[ends[at]].parent;
+      at += term.closes ? 2 : 1;
+    }
+  }
   int top = ends[0];
   for (int other : ends)
     while (top != other) {  // the one with the higher number is no ancestor of the other
@@ -104,12 +115,21 @@ std::vector<LoopGroup::Member> all_members(const Model& model) {
 
 }  // namespace
 
+int loop_rotors(const Model& model, const LoopJoint& loop) {
+  const auto& armature = model.loops.dof[static_cast<int>(DofProperty::armature)];
+  int rotors = 0;
+  for (const Element& e : stack_of(model, loop))
+    for (int i = e.v; !e.prescribed && i < e.v + e.nv; ++i) rotors += armature[i] > 0;
+  return rotors;
+}
+
 int loop_rows(const Model& model, const LoopJoint& loop) {
-  if (loop.kind != LoopKind::joint) return loop.kind == LoopKind::rod ? 1 : 0;
+  if (loop.kind == LoopKind::rod) return 1;
+  if (loop.kind == LoopKind::spring) return loop_rotors(model, loop);
   int rows = 6;
   for (const Element& e : stack_of(model, loop))
     if (!e.prescribed) rows -= e.nv;
-  return rows;
+  return rows + loop_rotors(model, loop);
 }
 
 std::vector<LoopGroup> make_loop_groups(const Model& model) {
@@ -131,6 +151,8 @@ std::vector<LoopGroup> make_loop_groups(const Model& model) {
     group.top = is_new ? tops[i] : std::min(group.top, tops[i]);
     members[i].row = group.rows;
     group.rows += members[i].n_rows;
+    if (members[i].loop >= 0)
+      group.rotors += loop_rotors(model, model.loops.joints[members[i].loop]);
     group.members.push_back(std::move(members[i]));
   }
   std::vector<LoopGroup> groups;

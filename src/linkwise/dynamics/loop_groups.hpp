@@ -18,7 +18,7 @@ struct LoopGroup {
   };
   /// A loop joint or a coupling: its rows [row, row + n_rows), and the columns, or -1 - row, where
   /// its forces act. Those of a joint are on its parent and its child, those of a coupling on the
-  /// body of each term.
+  /// body of each term, or on both where its joint closes a loop.
   struct Member {
     int loop = -1, coupling = -1;  ///< one of them
     int row = 0, n_rows = 0;
@@ -27,12 +27,15 @@ struct LoopGroup {
 
   int top = -1;
   int rows = 0, columns = 0;
+  int rotors = 0;  ///< how many of the rows are those of rotors, which hold nothing
   std::vector<Member> members;
   std::vector<Carrier> carriers;  ///< tip to base
 };
 
-/// Rows of a loop joint: directions that it holds.
+/// Rows of a loop joint: directions that it holds, then its rotors.
 int loop_rows(const Model& model, const LoopJoint& loop);
+/// Coordinates of a loop joint that turn a rotor.
+int loop_rotors(const Model& model, const LoopJoint& loop);
 
 /// Outermost tops first, the ground's group last.
 std::vector<LoopGroup> make_loop_groups(const Model& model);

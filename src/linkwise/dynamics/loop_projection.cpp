@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linkwise/kinematics/coupling_states.hpp"
+
 namespace linkwise {
 namespace {
 
@@ -88,19 +90,25 @@ double LoopProjection::miss(const double* q, const double* v) {
   }
   for (int c = 0; c < model_.n_couplings(); ++c) {
     const Coupling& coupling = model_.couplings[c];
-    double residual = of_rates ? 0 : -coupling.offset;
-    for (const Coupling::Term& term : coupling.terms)
-      residual += term.factor * (of_rates ? v[term.v] : q[term.q]);
+    const CouplingMiss miss = miss_of(coupling, coupled_state(q, v, states_));
+    const double residual = of_rates ? miss.slip : miss.gap;
     sum += residual * residual;
     asked_[6 * static_cast<size_t>(model_.n_loops()) + c] = -residual;
   }
   return std::sqrt(sum);
 }
 
-double LoopProjection::gap(const double* q) {
+SweepInput<double> LoopProjection::input(const double* q, const double* v) const {
   SweepInput<double> in;
   in.q = q;
-  states_.update(in);
+  in.v = v;
+  in.loop_q = given_.q;
+  in.loop_v = given_.v;
+  return in;
+}
+
+double LoopProjection::gap(const double* q) {
+  states_.update(input(q, nullptr));
   return miss(q, nullptr);
 }
 
@@ -109,10 +117,7 @@ bool LoopProjection::close(const double* q, double least, double* du) {
 }
 
 double LoopProjection::slip(const double* q, const double* v) {
-  SweepInput<double> in;
-  in.q = q;
-  in.v = v;
-  states_.update(in);
+  states_.update(input(q, v));
   return miss(q, v);
 }
 

@@ -13,10 +13,18 @@
 
 namespace linkwise {
 
+/// Coordinates [nq] and rates [nv] of loop joints, as of SweepInput.
+struct LoopMotion {
+  const double *q = nullptr, *v = nullptr;
+};
+
 class LoopProjection {
  public:
   /// The model must outlive it; prescribed joints stay where they are.
   explicit LoopProjection(const Model& model);
+
+  /// From now on, what loop joints of given motion are to follow.
+  void give(const LoopMotion& given) { given_ = given; }
 
   /// Looks how many directions the loops hold at q, which closes them, and at positions beside it.
   /// The most of them is what they hold anywhere but in singular positions.
@@ -46,7 +54,10 @@ class LoopProjection {
   double miss(const double* q, const double* v);
   LoopReport report_at(const double* q);
 
+  SweepInput<double> input(const double* q, const double* v) const;
+
   const Model& model_;
+  LoopMotion given_;
   LoopStates states_;
   ArticulatedLoops kernel_;
   std::vector<double> asked_;

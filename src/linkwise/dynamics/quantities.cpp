@@ -1,5 +1,7 @@
 #include "linkwise/dynamics/quantities.hpp"
 
+#include <algorithm>
+
 #include "linkwise/forces/passive.hpp"
 #include "linkwise/kinematics/loop_states.hpp"
 
@@ -49,6 +51,15 @@ std::vector<BodyState<double>> states_of(const Model& model, const double* q, co
   return states;
 }
 
+LoopStates loop_states(const Model& model, const double* q, const double* v) {
+  LoopStates loops(model);
+  SweepInput<double> in;
+  in.q = q;
+  in.v = v;
+  loops.update(in);
+  return loops;
+}
+
 }  // namespace
 
 void joint_poses(const Model& model, const double* q, double* poses) {
@@ -75,19 +86,19 @@ double kinetic_energy(const Model& model, const double* q, const double* v) {
         with_body(model, n, [&](const auto& body) { return kinetic_energy(body, states[n].v); });
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int i = 0; i < model.nv(); ++i) energy += 0.5 * armature[i] * v[i] * v[i];
+  const auto& of_loops = model.loops.dof[static_cast<int>(DofProperty::armature)];
+  if (std::none_of(of_loops.begin(), of_loops.end(), [](double x) { return x > 0; })) return energy;
+  const std::vector<double> u = loop_states(model, q, v).v();
+  for (size_t i = 0; i < u.size(); ++i) energy += 0.5 * of_loops[i] * u[i] * u[i];
   return energy;
 }
 
-double potential_energy(const Model& model, const double* q) {
+double potential_energy(const Model& model, const double* q, const double* loop_q) {
   const auto frames = element_frames(model, q);
   double energy = passive_potential(model, q);
-  if (has_passive_forces(model.loops)) {
-    LoopStates loops(model);
-    SweepInput<double> in;
-    in.q = q;
-    loops.update(in);
-    energy += passive_potential(model.loops, loops.q().data());
-  }
+  if (has_passive_forces(model.loops))
+    energy +=
+        passive_potential(model.loops, loop_q ? loop_q : loop_states(model, q, nullptr).q().data());
   for (int n = 0; n < model.n_bodies(); ++n) {
     const auto& X = frames[model.topology[n].first_element + model.topology[n].n_elements - 1];
     energy += with_body(model, n,

@@ -12,24 +12,30 @@ void add(const Vec3<double>& w, const Vec3<double>& u, const double* D, double f
   for (int i = 0; i < 3; ++i) tau[i] += factor * parts[i];
 }
 
-}  // namespace
+/// Of the joints of a tree, or of those that close loops.
+template <class Joints>
+const double* armature_of(const Joints& joints, const Element& e) {
+  return joints.dof[static_cast<int>(DofProperty::armature)].data() + e.v;
+}
 
-bool has_armature_bias(const Model& model, const Element& e) {
-  const double* D = model.dof_values(DofProperty::armature).data() + e.v;
+template <class Joints>
+bool has_bias(const Joints& joints, const Element& e) {
+  const double* D = armature_of(joints, e);
   const bool turns = info_of(e.kind).turning > 0 || info_of(e.kind).quaternion >= 0;
   return turns && std::any_of(D, D + e.nv, [](double x) { return x > 0; });
 }
 
-bool has_armature_bias(const Model& model) {
-  return std::any_of(model.elements.begin(), model.elements.end(),
-                     [&](const Element& e) { return has_armature_bias(model, e); });
+template <class Joints>
+bool any_has_bias(const Joints& joints) {
+  return std::any_of(joints.elements.begin(), joints.elements.end(),
+                     [&](const Element& e) { return has_bias(joints, e); });
 }
 
-void add_armature_bias(const Model& model, const double* v, double factor, double* tau) {
-  const std::vector<double>& armature = model.dof_values(DofProperty::armature);
-  for (const Element& e : model.elements) {
-    if (!has_armature_bias(model, e)) continue;
-    const double* D = armature.data() + e.v;
+template <class Joints>
+void add_bias(const Joints& joints, const double* v, double factor, double* tau) {
+  for (const Element& e : joints.elements) {
+    if (!has_bias(joints, e)) continue;
+    const double* D = armature_of(joints, e);
     const Vec3<double> w = angular_part(e, v);
     const int turning = info_of(e.kind).turning;
     if (turning == 2) {
@@ -40,6 +46,19 @@ void add_armature_bias(const Model& model, const double* v, double factor, doubl
     if (turning == 3) add(w, linear_part(e, v), D, factor, tau + e.v);
     add(w, w, D + turning, factor, tau + e.v + turning);
   }
+}
+
+}  // namespace
+
+bool has_armature_bias(const Model& model, const Element& e) { return has_bias(model, e); }
+bool has_armature_bias(const Model& model) { return any_has_bias(model); }
+bool has_armature_bias(const LoopJoints& loops) { return any_has_bias(loops); }
+
+void add_armature_bias(const Model& model, const double* v, double factor, double* tau) {
+  add_bias(model, v, factor, tau);
+}
+void add_armature_bias(const LoopJoints& loops, const double* v, double factor, double* tau) {
+  add_bias(loops, v, factor, tau);
 }
 
 }  // namespace linkwise

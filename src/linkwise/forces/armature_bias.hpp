@@ -10,8 +10,11 @@ namespace linkwise {
 
 bool has_armature_bias(const Model& model, const Element& element);
 bool has_armature_bias(const Model& model);
+bool has_armature_bias(const LoopJoints& loops);
 
 /// Adds factor times w x (D u) to tau [nv].
 void add_armature_bias(const Model& model, const double* v, double factor, double* tau);
+/// The same of joints that close loops: v and tau are theirs alone.
+void add_armature_bias(const LoopJoints& loops, const double* v, double factor, double* tau);
 
 }  // namespace linkwise

@@ -33,36 +33,38 @@ Breakpoints of_function(const FunctionCourse& course, TableAction action, double
 
 }  // namespace
 
+void add_drive_torque(const JointInfo& joint, const std::vector<Element>& elements,
+                      const Drive& drive, double t, const double* q, const double* v, double* tau) {
+  if (drive.kind == DriveKind::free || is_prescribed(drive.kind)) return;
+  double values[6], target_rates[6] = {};
+  if (drive.table) {
+    drive.table->evaluate(t, values);
+    if (drive.kind == DriveKind::pd) drive.table->evaluate(t, target_rates, 1);
+  } else if (drive.callable) {
+    drive.callable(t, q + joint.q, v + joint.v, values);
+  } else {
+    for (int i = 0; i < joint.nv; ++i) values[i] = drive.value[i];
+  }
+  if (drive.kind != DriveKind::pd) {
+    for (int i = 0; i < joint.nv; ++i) tau[joint.v + i] += values[i];
+    return;
+  }
+  for (int i = joint.first_element; i < joint.first_element + joint.n_elements; ++i) {
+    const Element& e = elements[i];
+    double rate[3], force[3];
+    scalar_rates(e, q, v, rate);
+    for (int k = 0; k < e.nv; ++k) {
+      const int own = e.v - joint.v + k;
+      force[k] = drive.kp * (values[own] - q[e.q + k]) + drive.kd * (target_rates[own] - rate[k]);
+    }
+    add_coordinate_forces(e, q, force, tau);
+  }
+}
+
 void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t,
                        const double* q, const double* v, double* tau) {
-  for (size_t j = 0; j < drives.size(); ++j) {
-    const Drive& drive = drives[j];
-    if (drive.kind == DriveKind::free || is_prescribed(drive.kind)) continue;
-    const JointInfo& joint = model.joints[j];
-    double values[6], target_rates[6] = {};
-    if (drive.table) {
-      drive.table->evaluate(t, values);
-      if (drive.kind == DriveKind::pd) drive.table->evaluate(t, target_rates, 1);
-    } else if (drive.callable) {
-      drive.callable(t, q + joint.q, v + joint.v, values);
-    } else {
-      for (int i = 0; i < joint.nv; ++i) values[i] = drive.value[i];
-    }
-    if (drive.kind != DriveKind::pd) {
-      for (int i = 0; i < joint.nv; ++i) tau[joint.v + i] += values[i];
-      continue;
-    }
-    for (int i = joint.first_element; i < joint.first_element + joint.n_elements; ++i) {
-      const Element& e = model.elements[i];
-      double rate[3], force[3];
-      scalar_rates(e, q, v, rate);
-      for (int k = 0; k < e.nv; ++k) {
-        const int own = e.v - joint.v + k;
-        force[k] = drive.kp * (values[own] - q[e.q + k]) + drive.kd * (target_rates[own] - rate[k]);
-      }
-      add_coordinate_forces(e, q, force, tau);
-    }
-  }
+  for (int j = 0; j < model.n_joints(); ++j)
+    add_drive_torque(model.joints[j], model.elements, drives[j], t, q, v, tau);
 }
 
 void evaluate_motion(const JointInfo& joint, const Drive& drive, double t, double* q, double* v,
@@ -137,6 +139,8 @@ Wrench wrench_at(const Model& model, const Frame& frame, const std::string& axes
 void check_drive(const Model& model, const JointInfo& joint, const Drive& drive) {
   const bool is_motion = drive.kind == DriveKind::motion, is_pd = drive.kind == DriveKind::pd;
   const std::string head = "joint '" + joint.name + "'" + model.where() + ": ";
+  if (joint.nv == 0)
+    throw InputError(head + "a fixed joint or rod has no coordinate to drive; drive another joint");
   if ((is_pd || is_motion) && joint.nq != joint.nv)
     throw InputError(head + "a " + (is_motion ? "motion" : "pd") +
                      " drive needs angles or distances, not a quaternion; drive it by torque");

@@ -50,8 +50,13 @@ struct Wrench {
   FunctionCourse course;  ///< of the function
 };
 
-/// One drive per joint; adds their torques to tau [nv]. A joint whose motion is given gets none.
-/// pd: kp (target - q) + kd (dtarget/dt - dq/dt) along the coordinates, for joints whose
+/// Adds the torque of a joint's drive to tau [nv]; its elements are among `elements`, and q, v and
+/// tau are those of the tree, or of the joints that close loops.
+void add_drive_torque(const JointInfo& joint, const std::vector<Element>& elements,
+                      const Drive& drive, double t, const double* q, const double* v, double* tau);
+
+/// One drive per joint; adds those of the tree to tau [nv]. A joint whose motion is given gets
+/// none. pd: kp (target - q) + kd (dtarget/dt - dq/dt) along the coordinates, for joints whose
 /// coordinates are angles and distances.
 void add_drive_torques(const Model& model, const std::vector<Drive>& drives, double t,
                        const double* q, const double* v, double* tau);

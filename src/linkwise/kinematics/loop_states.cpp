@@ -71,20 +71,35 @@ LoopStates::LoopStates(const Model& model)
       loops_(model.n_loops()),
       start_(model.loops.nq),
       q_(model.loops.nq),
-      v_(model.loops.nv) {
+      v_(model.loops.nv),
+      given_v_(model.loops.nv),
+      given_du_(model.loops.nv) {
   for (int l = 0; l < model.n_loops(); ++l) {
     const LoopJoint& loop = model.loops.joints[l];
     paths_.push_back(loop_path(model, loop));
     loops_[l].length = length_of(model, loop, paths_[l]);
   }
-  for (const Element& e : model.loops.elements)
+  for (const Element& e : model.loops.elements) {
     if (const int own = info_of(e.kind).quaternion; own >= 0) start_[e.q + own + 3] = 1;
+    any_given_ |= e.prescribed;
+  }
 }
 
-void LoopStates::update(const SweepInput<double>& in, const double* last) {
+void LoopStates::update(const SweepInput<double>& in) {
   calc_body_states(model_, carriers_, in, bodies_.data(), general_.data());
-  std::copy_n(last ? last : start_.data(), q_.size(), q_.begin());
+  std::copy_n(in.loop_q ? in.loop_q : start_.data(), q_.size(), q_.begin());
+  if (any_given_) place_given(in);
   for (int l = 0; l < model_.n_loops(); ++l) update_loop(in.v != nullptr, l);
+}
+
+void LoopStates::place_given(const SweepInput<double>& in) {
+  for (const Element& e : model_.loops.elements) {
+    if (!e.prescribed) continue;
+    for (int i = e.v; i < e.v + e.nv; ++i) {
+      given_v_[i] = in.v && in.loop_v ? in.loop_v[i] : 0;
+      given_du_[i] = in.loop_du ? in.loop_du[i] : 0;
+    }
+  }
 }
 
 void LoopStates::update_loop(bool moving, int l) {
@@ -111,29 +126,45 @@ void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
   const std::span<const Element> stack = stack_of(model_, loop);
   closure_coordinates(stack, X_FE, q_.data());
 
-  // The elements once without rates, for P, then with them, for c.
+  // The elements once with given rates alone, for P, then with all, for c.
   SweepInput<double> at;
   at.q = q_.data();
+  at.v = given_v_.data();
   BodyState<double> state;
   GeneralState<double> columns;
   calc_general_state(stack, at, Motion<double>{}, state, columns);
   calc_closure_basis(columns.P, columns.n, out.basis);
   std::copy_n(columns.dof, columns.n, out.dof);
-  out.rows = out.basis.rows();
   closure_residual(out.basis, closure_gap(state.X, X_FE), out.gap);
 
-  const Vector6<double> a = to_array(of_a), b = to_array(of_b);
+  const Vector6<double> a = to_array(of_a), b = to_array(of_b), given = to_array(state.v);
   Vector6<double> relative;
-  for (int i = 0; i < 6; ++i) relative[i] = b[i] - a[i];
+  for (int i = 0; i < 6; ++i) relative[i] = b[i] - a[i] - given[i];
+  for (const Element& e : stack)
+    for (int i = e.v; e.prescribed && i < e.v + e.nv; ++i) v_[i] = given_v_[i];
   for (int i = 0; i < columns.n; ++i)
     v_[columns.dof[i]] = linkwise::along(out.basis.dual[i], relative);
   at.v = moving ? v_.data() : nullptr;
+  at.prescribed = given_du_.data();
   calc_general_state(stack, at, loop.on_parent * velocity_of(loop.parent_body), state, columns);
   const Vector6<double> c = to_array(state.c);
-  for (int i = 0; i < out.rows; ++i) {
+  out.rows = out.held = out.basis.rows();
+  for (int i = 0; i < out.held; ++i) {
+    out.row[i] = out.basis.Q[i];
+    out.yields[i] = 0;
     out.slip[i] = linkwise::along(out.basis.Q[i], relative);
-    out.r[i] = linkwise::along(out.basis.Q[i], c);
   }
+  const auto& armature = model_.loops.dof[static_cast<int>(DofProperty::armature)];
+  for (int k = 0; k < columns.n; ++k) {
+    const double I = armature[columns.dof[k]];
+    if (!(I > 0)) continue;
+    const int i = out.rows++;
+    out.row[i] = out.basis.dual[k];
+    out.yields[i] = 1 / I;
+    out.gap[i] = out.slip[i] = 0;
+  }
+  for (int i = 0; i < out.rows; ++i) out.r[i] = linkwise::along(out.row[i], c);
+  out.bias = columns.n > 0 ? linkwise::along(out.basis.dual[0], c) : 0;
 }
 
 /// A rod keeps the distance of two points: their acceleration along n is -|v across n|^2 /
@@ -152,23 +183,32 @@ void LoopStates::update_distance(int l, const Transform<double>& X_FE, const Mot
   const Vec3<double> turned = cross(of_b.ang, of_b.lin) - X_FE.R * cross(of_E.ang, of_E.lin);
   const bool spring = loop.kind == LoopKind::spring;
   out.basis.n = spring ? 1 : 0;
-  out.rows = spring ? 0 : 1;
+  out.rows = out.held = spring ? 0 : 1;
+  out.row[0] = {n.x, n.y, n.z, 0, 0, 0};
+  out.yields[0] = 0;
+  const double bent = distance > 0 ? dot(across, across) / distance : 0;
+  out.r[0] = out.bias = -bent - dot(n, turned);
   if (spring) {
-    out.basis.dual[0] = {n.x, n.y, n.z, 0, 0, 0};
+    out.basis.dual[0] = out.row[0];
     out.dof[0] = loop.joint.v;
     q_[loop.joint.q] = distance - loop.length;
     v_[loop.joint.v] = dot(n, relative);
+    const double I =
+        model_.loops.dof[static_cast<int>(DofProperty::armature)][loop.joint.v];
+    if (!(I > 0)) return;
+    out.rows = 1;
+    out.yields[0] = 1 / I;
+    out.gap[0] = out.slip[0] = 0;
     return;
   }
-  out.basis.Q[0] = {n.x, n.y, n.z, 0, 0, 0};
+  out.basis.Q[0] = out.row[0];
   out.gap[0] = distance - loop.length;
   out.slip[0] = dot(n, relative);
-  out.r[0] = -dot(across, across) / distance - dot(n, turned);
 }
 
 LoopMiss miss_of(const LoopState& state, const double* residuals) {
   Vector6<double> held{};
-  for (int i = 0; i < state.rows; ++i)
+  for (int i = 0; i < state.held; ++i)
     for (int k = 0; k < 6; ++k) held[k] += residuals[i] * state.basis.Q[i][k];
   return {size({held[0], held[1], held[2]}), size({held[3], held[4], held[5]})};
 }
@@ -186,28 +226,6 @@ void require_closed(const Model& model, const LoopStates& states, const std::str
       throw InputError(where + joint + " opens: what it joins parts by " + rounded(slip.shift) +
                        " m/s and " + rounded(slip.turn) +
                        " rad/s; give v that keeps its loop closed");
-  }
-}
-
-void require_coupled(const Model& model, const double* q, const double* v,
-                     const std::string& where) {
-  constexpr double allowed = 1e-6;
-  for (const Coupling& coupling : model.couplings) {
-    double gap = -coupling.offset, slip = 0, size = 1 + std::abs(coupling.offset), speed = 1;
-    for (const Coupling::Term& term : coupling.terms) {
-      const double angle = term.factor * q[term.q], rate = v ? term.factor * v[term.v] : 0;
-      gap += angle;
-      slip += rate;
-      size += std::abs(angle);
-      speed += std::abs(rate);
-    }
-    const std::string name = "coupling '" + coupling.name + "'" + model.where();
-    if (!(std::abs(gap) <= allowed * size))
-      throw InputError(where + name + ": its coordinates add up to " + rounded(gap) +
-                       " beside its offset; give q that keeps it");
-    if (!(std::abs(slip) <= allowed * speed))
-      throw InputError(where + name + ": its rates add up to " + rounded(slip) +
-                       "; give v that keeps it");
   }
 }
 

@@ -5,6 +5,9 @@
 //     0 = G_a v_a + G_b v_b,      G_b = Q^T X_F,     G_a = -Q^T X_FA
 //     r = G_a a_a + G_b a_b,      r = Q^T c
 // with P, Q and c of the same stack of elements that a tree joint would have (joints/closure.hpp).
+// A joint of given motion has q_l and u_l from outside, no P, and what they miss is a gap. A rotor
+// of inertia I along coordinate k is a row of its own, P^+T_k, whose force s = -I du_k makes it
+// yield by s / I.
 // What is left of the pose is the gap, which is closed in a state that is consistent. A rod has no
 // P, and Q is the one direction n from E to F. A spring has no Q, and P^+T is n.
 #include <span>
@@ -33,21 +36,23 @@ struct LoopState {
   Transform<double> X_FA;  ///< body a's frame, or the ground's -> F
   ClosureBasis basis;      ///< P^+T and Q
   int dof[6];              ///< of the columns of P, as loop joints count them
-  int rows;
-  double r[6];     ///< Q^T c [rows]
-  double gap[6];   ///< position residual g [rows]
-  double slip[6];  ///< Q^T v_rel [rows]: the rate of g where the gap is closed
-  double speed;    ///< of the faster one of E and F at F, m/s; turns count by the length
-  double length;   ///< m: how far the loop reaches, by which turns are compared
+  int held;                ///< directions that the joint holds: rows of Q
+  int rows;                ///< these, then one per rotor
+  Vector6<double> row[6];  ///< direction of each: of Q, then of P^+T
+  double yields[6];        ///< by a unit of force: 1 / I of a rotor, else 0
+  double r[6];             ///< row . c
+  double bias;             ///< P^+ c of a joint of one axis
+  double gap[6];           ///< position residual g [held]; 0 of rotors
+  double slip[6];          ///< Q^T v_rel [held]: the rate of g where the gap is closed
+  double speed;            ///< of the faster one of E and F at F, m/s; turns count by the length
+  double length;           ///< m: how far the loop reaches, by which turns are compared
 };
 
 class LoopStates {
  public:
   explicit LoopStates(const Model& model);
 
-  /// `last`: coordinates of all loop joints, from which angles are continued, so that turns are
-  /// counted; null: from the zero position.
-  void update(const SweepInput<double>& in, const double* last = nullptr);
+  void update(const SweepInput<double>& in);
 
   const LoopState& operator[](int l) const { return loops_[l]; }
   const LoopPath& path(int l) const { return paths_[l]; }
@@ -61,6 +66,7 @@ class LoopStates {
   void update_joint(bool moving, int l, const Transform<double>& X_FE, const Motion<double>& of_a,
                     const Motion<double>& of_b);
   void update_distance(int l, const Transform<double>& X_FE, const Motion<double>& of_b);
+  void place_given(const SweepInput<double>& in);
   Motion<double> velocity_of(int body) const {
     return body >= 0 ? bodies_[body].v : Motion<double>{};
   }
@@ -72,6 +78,8 @@ class LoopStates {
   std::vector<GeneralState<double>> general_;
   std::vector<LoopState> loops_;
   std::vector<double> start_, q_, v_;
+  std::vector<double> given_v_, given_du_;  ///< of prescribed joints, else 0
+  bool any_given_ = false;
 };
 
 /// What a loop's residuals are as a shift, m or m/s, and a turn, rad or rad/s.
@@ -83,10 +91,6 @@ LoopMiss miss_of(const LoopState& state, const double* residuals);
 /// InputError naming the first loop that a state leaves open, or opens, by more than a millionth of
 /// its length. `where`: begins the message.
 void require_closed(const Model& model, const LoopStates& states, const std::string& where = "");
-
-/// The same of couplings; v may be null.
-void require_coupled(const Model& model, const double* q, const double* v,
-                     const std::string& where = "");
 
 /// What wrench w of the joint on its child is on body b, and on body a, in the bodies' own frames.
 inline Force<double> wrench_on_b(const LoopJoint& loop, const Force<double>& w) {

@@ -15,6 +15,12 @@ struct SweepInput {
   const S* prescribed = nullptr;
   /// Torques of loop joints, [nv] of theirs; null: none.
   const S* loop_tau = nullptr;
+  /// Coordinates of loop joints, [nq] of theirs: those of prescribed ones are given, and angles of
+  /// the others are continued from here, so that turns are counted; null: the zero position.
+  const S* loop_q = nullptr;
+  /// Rates and accelerations of prescribed loop joints, [nv] of loop joints; null: zero.
+  const S* loop_v = nullptr;
+  const S* loop_du = nullptr;
   /// Times the model's gravity; 0 leaves it out.
   double gravity_factor = 1;
 };

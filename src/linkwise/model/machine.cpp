@@ -158,7 +158,6 @@ Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::s
         loop >= 0 && spec.loop_joints[loop].kind != LoopKind::joint)
       throw InputError("joint '" + name + "'" + where +
                        " is a rod or a spring, whose motion cannot be given; give that of a joint");
-    if (j >= 0) graph.joints[j].acts = true;
     if (j >= 0 || (spec.floating_base && name == spec.floating_joint))
       machine.prescribed[j >= 0 ? j : n_joints] = 1;
   }

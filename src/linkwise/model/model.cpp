@@ -67,8 +67,14 @@ Model::Model(ModelSpec given) : spec_(std::move(given)) {
                         DofProperty::limit_stiffness})
     has_passive_ |=
         std::any_of(dof_values(p).begin(), dof_values(p).end(), [](double x) { return x > 0; });
-  for (const std::string& name : spec_.prescribed) joint_index(name);
+  for (const std::string& name : spec_.prescribed) load_index(name);
   couplings = place_couplings(*this);
+}
+
+int Model::load_index(const std::string& name) const {
+  for (int l = 0; l < n_loops(); ++l)
+    if (loops.joints[l].joint.name == name) return n_joints() + l;
+  return joint_index(name);
 }
 
 int Model::joint_index(const std::string& name) const {

@@ -103,13 +103,25 @@ struct LoopJoints {
   int nq = 0, nv = 0;
 };
 
-/// Sum of factor times coordinate = offset.
+/// Sum of polynomials of coordinates = offset.
 struct Coupling {
   struct Term {
-    int joint;  ///< of the tree
-    int body;   ///< that the joint belongs to
-    int q, v;   ///< its coordinate and rate
-    double factor;
+    int joint;            ///< row of its load: joints that close loops stand last
+    int body;             ///< that the joint belongs to
+    int q, v;             ///< its coordinate and rate, in the tree's or in loop joints'
+    double factor;        ///< of the coordinate
+    double higher[3]{};   ///< of its second, third and fourth power
+    bool closes = false;  ///< the joint closes a loop
+
+    double value(double x) const {
+      return x * (factor + x * (higher[0] + x * (higher[1] + x * higher[2])));
+    }
+    double slope(double x) const {
+      return factor + x * (2 * higher[0] + x * (3 * higher[1] + x * 4 * higher[2]));
+    }
+    double curvature(double x) const {
+      return 2 * higher[0] + x * (6 * higher[1] + x * 12 * higher[2]);
+    }
   };
   std::string name;
   std::vector<Term> terms;
@@ -143,6 +155,13 @@ class Model {
   double total_mass() const { return total_mass_; }
   /// Index of a joint or throws InputError with the nearest names.
   int joint_index(const std::string& name) const;
+  /// The same among all joints, those that close loops behind those of the tree: the row of its
+  /// load.
+  int load_index(const std::string& name) const;
+  /// Its q and v are places among the tree's coordinates, or among those of loop joints.
+  const JointInfo& joint_at(int load) const {
+    return load < n_joints() ? joints[load] : loops.joints[load - n_joints()].joint;
+  }
   int link_index(const std::string& name) const;
   /// q at the zero position: zeros, quaternions (0, 0, 0, 1).
   std::vector<double> neutral_configuration() const;

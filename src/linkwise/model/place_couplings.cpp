@@ -1,5 +1,6 @@
 #include "linkwise/model/place_couplings.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -9,23 +10,36 @@
 namespace linkwise {
 namespace {
 
+std::string type_of(const Model& model, int load) {
+  const bool rod =
+      load >= model.n_joints() && model.loops.joints[load - model.n_joints()].kind == LoopKind::rod;
+  return rod ? "a rod" : joint_type_name(model.joint_at(load).type);
+}
+
 Coupling::Term place_term(const Model& model, const CouplingSpec::Term& given,
                           const std::string& head) {
   int j = -1;
   try {
-    j = model.joint_index(given.joint);
+    j = model.load_index(given.joint);
   } catch (const InputError& error) {
     throw InputError(head + error.what());
   }
-  const JointInfo& joint = model.joints[j];
+  const JointInfo& joint = model.joint_at(j);
   if (joint.nv != 1)
-    throw InputError(head + "joint '" + joint.name + "' is " + joint_type_name(joint.type) +
-                     " and has " + std::to_string(joint.nv) +
-                     " degrees of freedom; couple joints that have one");
-  if (!std::isfinite(given.factor) || given.factor == 0)
+    throw InputError(head + "joint '" + joint.name + "' is " + type_of(model, j) + " and has " +
+                     std::to_string(joint.nv) + " degrees of freedom; couple joints that have one");
+  bool moves = given.factor != 0, finite = std::isfinite(given.factor);
+  for (const double c : given.higher) {
+    moves |= c != 0;
+    finite &= std::isfinite(c);
+  }
+  if (!finite || !moves)
     throw InputError(head + "the factor of joint '" + joint.name + "' is " +
                      number_text(given.factor) + "; give a finite number other than 0");
-  return {j, joint.body, joint.q, joint.v, given.factor};
+  Coupling::Term term{j, joint.body, joint.q, joint.v, given.factor};
+  std::copy_n(given.higher, 3, term.higher);
+  term.closes = j >= model.n_joints();
+  return term;
 }
 
 }  // namespace
@@ -48,8 +62,10 @@ std::vector<Coupling> place_couplings(const Model& model) {
       if (!joints.insert(term.joint).second)
         throw InputError(head + "joint '" + term.joint + "' is named twice; add its factors up");
       coupling.terms.push_back(place_term(model, term, head));
-      const JointInfo& joint = model.joints[coupling.terms.back().joint];
-      moves |= !model.elements[joint.first_element].prescribed;
+      const Coupling::Term& placed = coupling.terms.back();
+      const JointInfo& joint = model.joint_at(placed.joint);
+      const auto& elements = placed.closes ? model.loops.elements : model.elements;
+      moves |= !elements[joint.first_element].prescribed;
     }
     if (coupling.terms.empty())
       throw InputError(head + "names no joint; give each joint its factor");

@@ -159,6 +159,7 @@ void spec_fields(A& archive, Spec& spec) {
     for (auto& term : coupling.terms) {
       text(archive, term.joint);
       archive.raw(&term.factor, sizeof(double));
+      archive.raw(term.higher, sizeof(term.higher));
     }
     archive.raw(&coupling.offset, sizeof(double));
   }

@@ -125,12 +125,13 @@ struct LoopJointSpec {
   double length = 0;                ///< of a rod or a spring, m
 };
 
-/// Coordinates of joints with one degree of freedom that go together, as gears, racks and
-/// differentials make them: sum of factor times coordinate = offset.
+/// Coordinates of joints with one degree of freedom that go together, as gears, racks,
+/// differentials and cams make them: the sum of a polynomial of each, without a constant, = offset.
 struct CouplingSpec {
   struct Term {
     std::string joint;
-    double factor;  ///< of its coordinate [rad, m]
+    double factor;       ///< of its coordinate [rad, m]
+    double higher[3]{};  ///< of its second, third and fourth power
   };
   std::string name;
   std::vector<Term> terms;

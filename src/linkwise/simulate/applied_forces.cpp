@@ -17,6 +17,7 @@ AppliedForces::AppliedForces(const Setup& setup, size_t members, const double* c
       drive_(members * nv_),
       external_(setup.wrenches.empty() ? 0 : members * n_load_) {
   if (constant) constant_.assign(constant, constant + members * nv_);
+  if (setup.model->n_loops() > 0) loops_.emplace(setup);
   for (const Wrench& w : setup.wrenches) world_wrenches_ |= w.world;
   poses_.resize(world_wrenches_ ? 16 * static_cast<size_t>(setup.model->n_joints()) : 0);
 }
@@ -28,6 +29,7 @@ void AppliedForces::evaluate(double t, const double* q, const double* v) {
   else
     std::copy(constant_.begin(), constant_.end(), tau_.begin());
   std::fill(external_.begin(), external_.end(), 0.0);
+  if (loops_) loops_->evaluate(t, q, v);
   for (size_t i = 0; i < members_; ++i, q += m.nq(), v += nv_) {
     double* tau = tau_.data() + i * nv_;
     add_drive_torques(m, setup_.drives, t, q, v, tau);
@@ -50,6 +52,9 @@ int AppliedForces::joint_with_bad_force(size_t member) const {
         bad(wrench ? wrench + 6 * j : wrench, 6))
       return j;
   }
+  for (int l = 0; loops_ && l < m.n_loops(); ++l)
+    if (const JointInfo& joint = m.loops.joints[l].joint; bad(loops_->tau() + joint.v, joint.nv))
+      return m.n_joints() + l;
   return -1;
 }
 

@@ -1,9 +1,10 @@
 #pragma once
 // What acts on the members of a simulation from outside, at one time: drives, wrenches, and the
 // joints' own forces.
+#include <optional>
 #include <vector>
 
-#include "linkwise/simulate/setup.hpp"
+#include "linkwise/simulate/loop_forces.hpp"
 
 namespace linkwise {
 
@@ -23,6 +24,10 @@ class AppliedForces {
     return external_.empty() ? nullptr : external_.data() + member * n_load_;
   }
 
+  /// Of joints that close loops; null where there are none.
+  LoopForces* loops() { return loops_ ? &*loops_ : nullptr; }
+  const LoopForces* loops() const { return loops_ ? &*loops_ : nullptr; }
+
   /// The joint whose torque or wrench is not finite, or -1.
   int joint_with_bad_force(size_t member) const;
 
@@ -36,6 +41,7 @@ class AppliedForces {
   const Setup& setup_;
   size_t members_, nv_, n_load_;
   bool world_wrenches_ = false;
+  std::optional<LoopForces> loops_;
   std::vector<double> constant_, tau_, drive_, external_, poses_;
 };
 

@@ -261,6 +261,8 @@ void Extremes::write_values(size_t at, const double* loads, const double* drive)
     if (j < static_cast<size_t>(model_->n_joints())) {
       const JointInfo& info = model_->joints[j];
       for (int i = info.v; i < info.v + info.nv; ++i) power += drive[i] * v[i];
+    } else if (evaluation_.power) {
+      power = evaluation_.power(static_cast<int>(j) - model_->n_joints());
     }
     *derived(drive_power) = power;
   }

@@ -37,6 +37,8 @@ class Extremes {
     std::function<bool(double t, const double* q, const double* v, double* du, double* loads,
                        double* drive)>
         evaluate;
+    /// Of what was evaluated last: the power of the drive of a joint that closes a loop.
+    std::function<double(int loop)> power;
   };
   /// Every step is looked at by `evaluation`, before the next one is taken.
   void evaluate_by(Evaluation evaluation) {

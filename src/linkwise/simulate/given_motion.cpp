@@ -52,8 +52,8 @@ void check_locked_joints(const Model& model, const std::vector<Drive>& drives, c
 
 std::unique_ptr<const Model> driven_model(const Model& model, const std::vector<Drive>& drives) {
   std::vector<std::string> given;
-  for (int j = 0; j < model.n_joints(); ++j)
-    if (is_prescribed(drives[j].kind)) given.push_back(model.joints[j].name);
+  for (int j = 0; j < model.n_loads(); ++j)
+    if (is_prescribed(drives[j].kind)) given.push_back(model.joint_at(j).name);
   if (given.empty()) return nullptr;
   ModelSpec spec = model.spec();
   spec.prescribed.insert(spec.prescribed.end(), given.begin(), given.end());

@@ -7,6 +7,7 @@
 #include "linkwise/base/error.hpp"
 #include "linkwise/base/finite.hpp"
 #include "linkwise/dynamics/quantities.hpp"
+#include "linkwise/simulate/loop_forces.hpp"
 
 namespace linkwise {
 namespace {
@@ -14,6 +15,12 @@ namespace {
 using enum Axis;
 
 void copy(const double* from, size_t n, double* to) { std::copy(from, from + n, to); }
+
+size_t n_terms(const Model& model) {
+  size_t n = 0;
+  for (const Coupling& coupling : model.couplings) n += coupling.terms.size();
+  return n;
+}
 
 void copy_work(const Instant& at, size_t first, size_t n, double* to) {
   if (at.work)
@@ -31,16 +38,33 @@ constexpr QuantityEntry table[] = {
      "of the outboard body relative to the inboard body; joints with more than one degree of "
      "freedom: in the joint frame, linear components first",
      "", "", [](const Instant& at, double* out) { copy(at.v, at.model.nv(), out); }, nullptr},
+    {"loop_position", "position", loop_coordinates, Needs::state, false, "",
+     "position of joints that close loops", "", "",
+     "zero where the two frames of the joint are one; angles are not wrapped; quaternions as in "
+     "position",
+     [](const Instant& at, double* out) { copy(at.loops->q(), at.model.loops.nq, out); }, nullptr},
+    {"loop_velocity", "velocity", loop_rates, Needs::state, false, "/s",
+     "velocity of joints that close loops", "as velocity", "", "",
+     [](const Instant& at, double* out) { copy(at.loops->v(), at.model.loops.nv, out); }, nullptr},
     {"acceleration", "acceleration", rates, Needs::forces, true, "/s^2", "joint acceleration", "",
      "", "time derivative of velocity, component by component",
      [](const Instant& at, double* out) { copy(at.du, at.model.nv(), out); }, nullptr},
     {"drive_torque", "drive_torque", rates, Needs::forces, true, "force", "drive torque or force",
      "", "", "power into the mechanism is drive_torque * velocity",
      [](const Instant& at, double* out) { copy(at.drive_torque, at.model.nv(), out); }, nullptr},
+    {"loop_drive_torque", "drive_torque", loop_rates, Needs::forces, false, "force",
+     "drive torque or force of joints that close loops", "", "",
+     "power into the mechanism is loop_drive_torque * loop_velocity",
+     [](const Instant& at, double* out) { copy(at.loops->drive(), at.model.loops.nv, out); },
+     nullptr},
     {"joint_load", "joint_load", joints, Needs::loads, true, "N, N m", "joint load",
      "joint frame, fixed in the outboard body", "joint point: the origin of the joint frame",
      "wrench that the inboard body exerts on the outboard body through the joint",
      [](const Instant& at, double* out) { copy(at.joint_load, 6 * at.model.n_loads(), out); },
+     nullptr},
+    {"coupling_load", "joint_load", terms, Needs::loads, false, "force", "load of a coupling", "",
+     "", "torque or force that the coupling puts into the joint, beside its drive",
+     [](const Instant& at, double* out) { copy(at.coupling_load, n_terms(at.model), out); },
      nullptr},
     {"external_wrench", "external_wrench", bodies, Needs::forces, false,
      "N (fx, fy, fz), N m (nx, ny, nz)", "external wrench", "joint frame, fixed in the body",
@@ -57,18 +81,33 @@ constexpr QuantityEntry table[] = {
     {"drive_work", "work", rates, Needs::works, true, "energy", "work of the drive", "", "",
      "integral of drive_torque * velocity since the start, along the integration's own steps",
      [](const Instant& at, double* out) { copy_work(at, 0, at.model.nv(), out); }, nullptr},
+    {"loop_drive_work", "work", loop_rates, Needs::works, false, "energy",
+     "work of the drives of joints that close loops", "", "",
+     "integral of loop_drive_torque * loop_velocity since the start, along the integration's own "
+     "steps",
+     [](const Instant& at, double* out) { copy_work(at, at.model.nv(), at.model.loops.nv, out); },
+     nullptr},
     {"external_work", "work", none, Needs::works, true, "J", "work of the external wrenches", "",
      "", "since the start, along the integration's own steps",
-     [](const Instant& at, double* out) { copy_work(at, at.model.nv(), 1, out); }, nullptr},
+     [](const Instant& at, double* out) {
+       copy_work(at, at.model.nv() + at.model.loops.nv, 1, out);
+     },
+     nullptr},
     {"dissipated_energy", "work", none, Needs::works, true, "J",
      "energy taken by damping, friction and the damping of stops", "", "",
      "since the start, along the integration's own steps",
-     [](const Instant& at, double* out) { copy_work(at, at.model.nv() + 1, 1, out); }, nullptr},
+     [](const Instant& at, double* out) {
+       copy_work(at, at.model.nv() + at.model.loops.nv + 1, 1, out);
+     },
+     nullptr},
     {"kinetic_energy", "energy", none, Needs::state, true, "J", "kinetic energy", "", "", "",
      [](const Instant& at, double* out) { *out = kinetic_energy(at.model, at.q, at.v); }, nullptr},
     {"potential_energy", "energy", none, Needs::state, true, "J",
      "potential energy of gravity, springs and stops", "", "", "",
-     [](const Instant& at, double* out) { *out = potential_energy(at.model, at.q); }, nullptr},
+     [](const Instant& at, double* out) {
+       *out = potential_energy(at.model, at.q, at.loops ? at.loops->q() : nullptr);
+     },
+     nullptr},
     {"steps", "statistics", none, Needs::state, false, "1",
      "accepted integration steps since the start", "", "", "", nullptr,
      [](const Instant& at) { return at.statistics.steps; }},
@@ -89,7 +128,8 @@ static_assert(std::size(table) <= Sample::size);
 }  // namespace
 
 std::string_view to_string(Axis axis) {
-  constexpr std::string_view names[] = {"coordinates", "rates", "joints", "bodies", "none"};
+  constexpr std::string_view names[] = {"coordinates", "rates",  "loop_coordinates", "loop_rates",
+                                        "terms",       "joints", "bodies",           "none"};
   return names[static_cast<int>(axis)];
 }
 
@@ -102,7 +142,14 @@ size_t quantity_index(std::string_view name) {
 }
 
 size_t quantity_width(const QuantityEntry& entry, const Model& model) {
-  const int widths[] = {model.nq(), model.nv(), 6 * model.n_loads(), 6 * model.n_joints(), 1};
+  const int widths[] = {model.nq(),
+                        model.nv(),
+                        model.loops.nq,
+                        model.loops.nv,
+                        static_cast<int>(n_terms(model)),
+                        6 * model.n_loads(),
+                        6 * model.n_joints(),
+                        1};
   return widths[static_cast<int>(entry.axis)];
 }
 

@@ -11,6 +11,8 @@
 
 namespace linkwise {
 
+class LoopForces;
+
 struct SimulationStatistics : IntegratorStatistics {
   long iterations = 0;
   /// Largest error that a solution for the integrator can have had, as Report has it; infinity
@@ -26,11 +28,14 @@ struct Instant {
   const double* external;  ///< null: nothing acts
   const double* work;      ///< of a WorkIntegral; null: not known
   const SimulationStatistics& statistics;
+  const LoopForces* loops = nullptr;      ///< null: no joint closes a loop
+  const double* coupling_load = nullptr;  ///< [terms of couplings]
 };
 
-/// The columns of a quantity: one per coordinate [nq], rate [nv], joint [n_loads][6] or body that
-/// a joint carries [n_joints][6], or a single one [1].
-enum class Axis { coordinates, rates, joints, bodies, none };
+/// The columns of a quantity: one per coordinate [nq], rate [nv], coordinate or rate of a joint
+/// that closes a loop, term of a coupling, joint [n_loads][6] or body that a joint carries
+/// [n_joints][6], or a single one [1].
+enum class Axis { coordinates, rates, loop_coordinates, loop_rates, terms, joints, bodies, none };
 std::string_view to_string(Axis axis);
 
 /// What has to be computed before it can be written.
@@ -42,7 +47,7 @@ struct QuantityEntry {
   Axis axis;
   Needs needs;
   bool of_members;  ///< also recorded where many simulations run at once
-  /// Per axis rates and coordinates: what follows the unit of the coordinate, or "force" or
+  /// Per rate and coordinate: what follows the unit of the coordinate, or "force" or
   /// "energy"; else the unit.
   std::string_view units;
   std::string_view long_name, frame, point, convention;

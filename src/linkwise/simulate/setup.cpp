@@ -14,7 +14,7 @@ Setup::Setup(std::shared_ptr<const Model> model_, SimulationOptions options_)
     : model(std::move(model_)),
       options(std::move(options_)),
       choice(choose_dynamics(*model, options.dynamics)),
-      drives(model->n_joints()) {
+      drives(model->n_loads()) {
   // Made once here so that bad options are refused before anything is written.
   if (options.state) {
     if (options.dynamics.method == "auto") options.dynamics.method = "constraint_force";
@@ -26,7 +26,7 @@ Setup::Setup(std::shared_ptr<const Model> model_, SimulationOptions options_)
 }
 
 void Setup::set_drive(int joint, Drive drive) {
-  check_drive(*model, model->joints[joint], drive);
+  check_drive(*model, model->joint_at(joint), drive);
   drives[joint] = std::move(drive);
   settled_ = false;
 }
@@ -77,8 +77,9 @@ void Setup::settle() {
 /// Torques that hold joints in loops are read off their loads.
 void Setup::require_one_axis() const {
   for (size_t j = 0; j < drives.size(); ++j)
-    if (is_prescribed(drives[j].kind) && model->joints[j].nv != 1)
-      throw InputError("joint '" + model->joints[j].name + "'" + model->where() +
+    if (is_prescribed(drives[j].kind) && model->joint_at(static_cast<int>(j)).nv != 1)
+      throw InputError("joint '" + model->joint_at(static_cast<int>(j)).name + "'" +
+                       model->where() +
                        " has several axes and a given motion; of machines with closed loops, "
                        "joints of one axis take that");
 }
@@ -112,7 +113,7 @@ void check_members(const Setup& setup) {
                      "' chooses its own steps; a batch takes " + fixed_step_names());
   for (size_t j = 0; j < setup.drives.size(); ++j)
     if (setup.drives[j].callable || setup.drives[j].motion)
-      throw InputError("drives['" + setup.model->joints[j].name +
+      throw InputError("drives['" + setup.model->joint_at(static_cast<int>(j)).name +
                        "'] is a function; a batch takes numbers and tables");
   for (const Wrench& wrench : setup.wrenches)
     if (wrench.callable)

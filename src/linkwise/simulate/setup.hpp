@@ -29,7 +29,8 @@ struct Setup {
   std::shared_ptr<const Model> model;  ///< as the user sees it
   SimulationOptions options;
   Choice choice;
-  std::vector<Drive> drives;  ///< one per joint; changed by set_drive()
+  /// One per joint, those that close loops last; changed by set_drive().
+  std::vector<Drive> drives;
   std::vector<Wrench> wrenches;
 
   /// InputError where the joint takes no such drive, or the body no wrench.

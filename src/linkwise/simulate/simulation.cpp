@@ -43,7 +43,8 @@ void Simulation::start(double t0, const Start& start) {
   y_.insert(y_.end(), start.v, start.v + members_ * nv());
   impose(t0, y_.data());
   for (size_t i = 0; i < members_; ++i) check_quaternions(m, y_.data() + i * nq());
-  close_loops(start.hold);
+  close_loops(t0, start.hold);
+  if (LoopForces* loops = forces_->loops()) loops->accepted(t0, y_.data(), rates_in(y_.data()));
   endings_.assign(members_, {Outcome::converged, t0, "", ""});
   failure_ = {};
   iterations_ = 0;
@@ -129,7 +130,10 @@ SweepInput<double> Simulation::input(double t, const double* q, const double* v)
   in.tau = forces_->tau(0);
   in.prescribed = given_.data();
   in.external = forces_->external(0);
-  if (passive_loops_) add_loop_forces(in);
+  if (const LoopForces* loops = forces_->loops()) {
+    in.loop_tau = loops->tau();
+    loops->give_to(in);
+  }
   return in;
 }
 
@@ -213,7 +217,7 @@ Ending Simulation::failure(size_t member, double t, Outcome outcome, int body,
     for (int i = info.v; i < info.v + info.nv && body < 0; ++i)
       if (!(std::abs(du[i]) < largest_acceleration)) joint = j;
   }
-  return {outcome, t, joint < 0 ? "" : m.joints[joint].name, described(outcome, body)};
+  return {outcome, t, joint < 0 ? "" : m.joint_at(joint).name, described(outcome, body)};
 }
 
 /// A fixed step that is too long for a stiff machine ends in states that cannot be evaluated.
@@ -292,7 +296,7 @@ void Simulation::accepted(double t, const double* y) {
   }
   if (method_) method_->accepted(t);
   if (loops_) coasting_.accepted();
-  if (passive_loops_) count_turns(t, y);
+  if (forces_->loops()) count_turns(t, y);
   watch_step(t, y);
 }
 
@@ -470,7 +474,8 @@ bool Simulation::powers(double t, double* out) {
     iterations_ = iterations;
     failure_ = failure;
     if (work_method_) work_method_->accepted(t);
-    add_holding_torques(work_loads_.data());
+    add_holding_torques(work_loads_.data(),
+                        work_method_ ? work_method_->coupling_load() : std::span<const double>());
   } else {
     forces_->evaluate(t, y_.data(), v);
   }
@@ -492,14 +497,21 @@ Outcome Simulation::evaluate_sample(double t, bool with_loads) {
   if (loops_) outcome = steer_sample(t, outcome);
   iterations_ = iterations;  // those of the record are not the integration's
   if (outcome == Outcome::converged && output_method_) output_method_->accepted(t);
-  if (outcome == Outcome::converged && setup_->any_given()) add_holding_torques(loads_.data());
+  if (outcome == Outcome::converged && setup_->any_given())
+    add_holding_torques(loads_.data(), output_method_ ? output_method_->coupling_load()
+                                                      : std::span<const double>());
   return outcome;
 }
 
 bool Simulation::write_sample(double t, const Sample& sample) {
-  if (sample.needs(Needs::forces) &&
-      evaluate_sample(t, sample.needs(Needs::loads)) != Outcome::converged)
-    return end_all(failure_);
+  if (sample.needs(Needs::forces)) {
+    if (evaluate_sample(t, sample.needs(Needs::loads)) != Outcome::converged)
+      return end_all(failure_);
+  } else if (LoopForces* loops = forces_->loops()) {
+    loops->update(t, y_.data(), rates_in(y_.data()));
+  }
+  const std::span<const double> couplings =
+      output_method_ ? output_method_->coupling_load() : std::span<const double>();
   const SimulationStatistics now = statistics();
   for (size_t i = 0; i < members_; ++i) {
     const Instant at{model(),
@@ -510,7 +522,9 @@ bool Simulation::write_sample(double t, const Sample& sample) {
                      forces_->drive(i),
                      forces_->external(i),
                      work_ ? work_->of(i) : nullptr,
-                     now};
+                     now,
+                     forces_->loops(),
+                     couplings.data()};
     const bool running = endings_[i].ok();
     sample.write(model(), i, running ? &at : nullptr);
     if (running) check_sample(t, i, sample);
@@ -531,21 +545,6 @@ void Simulation::check_sample(double t, size_t member, const Sample& sample) {
                           " is not finite; check masses, inertias, drives and the state for values "
                           "that are far too large"};
   sample.write(model(), member, nullptr);
-}
-
-/// The drive torques of joints of given motion: what the motion takes, less what acts by itself.
-/// loads: joint loads of a machine with loops.
-void Simulation::add_holding_torques(const double* loads) {
-  if (loops_) {
-    calc_torques_of_loads(loads);
-    return forces_->add_holding_torques(total_.data());
-  }
-  if (!inverse_) inverse_ = std::make_unique<BatchEvaluator>(model());
-  total_.resize(members_ * nv());
-  BatchInput in = rows(y_.data(), 0);
-  in.du = du_.data();
-  inverse_->inverse_dynamics(members_, in, total_.data(), nullptr);
-  forces_->add_holding_torques(total_.data());
 }
 
 SimulationStatistics Simulation::statistics() const {

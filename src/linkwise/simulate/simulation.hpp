@@ -133,11 +133,10 @@ class Simulation : private OdeSystem {
   void watch_start(double t, const double* y);
   void watch_evaluation(double t, const double* ydot);
   void watch_step(double t, const double* y);
-  void close_loops(const std::vector<std::string>& hold);
+  void close_loops(double t0, const std::vector<std::string>& hold);
   void begin_coasting();
   bool follows_error_test() const;
   SweepInput<double> input(double t, const double* q, const double* v);
-  void add_loop_forces(SweepInput<double>& in);
   void count_turns(double t, const double* y);
   BatchInput rows(const double* y, size_t member) const;
   Outcome evaluate_by(DynamicsMethod* method, double t, const double* y, double* ydot);
@@ -174,8 +173,9 @@ class Simulation : private OdeSystem {
   bool write_sample(double t, const Sample& sample);
   void check_sample(double t, size_t member, const Sample& sample);
   Outcome evaluate_sample(double t, bool with_loads);
-  void add_holding_torques(const double* loads);
+  void add_holding_torques(const double* loads, std::span<const double> couplings);
   void calc_torques_of_loads(const double* loads);
+  void take_coupling_torques(std::span<const double> couplings);
 
   std::shared_ptr<Setup> setup_;
   ParentAxes parent_axes_;
@@ -194,9 +194,7 @@ class Simulation : private OdeSystem {
   LoopReport loop_report_;  ///< of the last evaluation
   std::vector<double> steered_;
   std::vector<double> projected_;
-  std::unique_ptr<LoopStates> passive_loops_;  ///< where loop joints have springs or damping
   std::vector<double> work_loads_;
-  std::vector<double> loop_q_, loop_tau_;    ///< coordinates of the last accepted state
   std::unique_ptr<BatchEvaluator> lanes_;    ///< of several
   std::unique_ptr<BatchEvaluator> inverse_;  ///< made when first needed
   std::unique_ptr<Integrator> integrator_;

@@ -1,32 +1,35 @@
-// What a simulation does for joints that close loops.
+// What a simulation does for joints that close loops, and for those of given motion.
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
 #include <sstream>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/forces/passive.hpp"
 #include "linkwise/simulate/given_motion.hpp"
 #include "linkwise/simulate/simulation.hpp"
 
 namespace linkwise {
-void Simulation::close_loops(const std::vector<std::string>& hold) {
+void Simulation::close_loops(double t0, const std::vector<std::string>& hold) {
   loops_.reset();
-  passive_loops_.reset();
-  loop_q_.clear();
   assembled_.clear();
   const Model& m = setup_->driven();
   if (m.n_loops() + m.n_couplings() == 0) return;
   loops_ = std::make_unique<LoopProjection>(m);
-  if (has_passive_forces(m.loops)) passive_loops_ = std::make_unique<LoopStates>(m);
   normalise_quaternions(m, y_.data());
+  LoopMotion given;
+  if (LoopForces* forces = forces_->loops()) {
+    forces->hold(y_.data());
+    forces->give(t0);
+    given = {forces->near_q(), forces->given_v()};
+  }
+  loops_->give(given);
   const std::vector<double> q(y_.begin(), y_.begin() + position_size()),
       v(y_.begin() + position_size(), y_.end());
   if (setup_->options.exact_start) {
-    require_assembled(m, q, v);
+    require_assembled(m, q, v, given);
     return begin_coasting();
   }
-  const Assembly found = assemble(m, q, v, hold);
+  const Assembly found = assemble(m, q, v, hold, given);
   std::copy(found.q.begin(), found.q.end(), y_.begin());
   std::copy(found.v.begin(), found.v.end(), rates_in(y_.data()));
   begin_coasting();
@@ -61,28 +64,20 @@ Outcome Simulation::project(double t, double* y) {
   double *q = projected_.data(), *v = rates_in(q);
   to_state(q);
   impose(t, q);
+  if (LoopForces* forces = forces_->loops()) forces->give(t);
   const Outcome outcome = loops_->project(q, v);
   if (outcome != Outcome::converged) {
     failure_ = {outcome, t, "", described(outcome)};
     return outcome;
   }
   parent_axes_.from_child(q, v);
-  for (size_t j = 0; j < setup_->drives.size(); ++j) {
+  for (int j = 0; j < model().n_joints(); ++j) {
     if (setup_->drives[j].kind == DriveKind::motion) continue;
     const JointInfo& joint = model().joints[j];
     std::copy_n(q + joint.q, joint.nq, y + joint.q);
     std::copy_n(v + joint.v, joint.nv, rates_in(y) + joint.v);
   }
   return Outcome::converged;
-}
-
-/// Turns of loop joints are counted from the last accepted state on.
-void Simulation::add_loop_forces(SweepInput<double>& in) {
-  passive_loops_->update(in, loop_q_.empty() ? nullptr : loop_q_.data());
-  loop_tau_.assign(model().loops.nv, 0.0);
-  add_passive_forces(model().loops, passive_loops_->q().data(), passive_loops_->v().data(),
-                     loop_tau_.data());
-  in.loop_tau = loop_tau_.data();
 }
 
 /// dv: derivative of the rates of the integrator's y.
@@ -117,10 +112,18 @@ void Simulation::evaluate_for(Extremes& extremes) {
   extremes.evaluate_by(
       {[this](double t, double* q, double* v) {
          impose_motion(model(), setup_->drives, t, q, v, given_.data());
+         if (LoopForces* loops = forces_->loops()) loops->give(t);
          loops_->project(q, v);
        },
        [this](double t, const double* q, const double* v, double* du, double* loads,
-              double* drive) { return evaluate_at(t, q, v, du, loads, drive); }});
+              double* drive) { return evaluate_at(t, q, v, du, loads, drive); },
+       [this](int l) {
+         const LoopForces& loops = *forces_->loops();
+         const JointInfo& joint = model().loops.joints[l].joint;
+         double power = 0;
+         for (int i = joint.v; i < joint.v + joint.nv; ++i) power += loops.drive()[i] * loops.v()[i];
+         return power;
+       }});
 }
 
 /// What fails there ends nothing.
@@ -139,20 +142,50 @@ bool Simulation::evaluate_at(double t, const double* q, const double* v, double*
   return true;
 }
 
+/// The drive torques of joints of given motion: what the motion takes, less what acts by itself.
+/// loads: joint loads of a machine with loops.
+void Simulation::add_holding_torques(const double* loads, std::span<const double> couplings) {
+  if (loops_) {
+    calc_torques_of_loads(loads);
+    take_coupling_torques(couplings);
+    if (LoopForces* loops = forces_->loops()) loops->add_holding_torques(loads);
+    return forces_->add_holding_torques(total_.data());
+  }
+  if (!inverse_) inverse_ = std::make_unique<BatchEvaluator>(model());
+  total_.resize(members_ * nv());
+  BatchInput in = rows(y_.data(), 0);
+  in.du = du_.data();
+  inverse_->inverse_dynamics(members_, in, total_.data(), nullptr);
+  forces_->add_holding_torques(total_.data());
+}
+
 /// What joints of given motion pass on along their axes, and what their rotors take, into total_.
 void Simulation::calc_torques_of_loads(const double* loads) {
   total_.assign(nv(), 0.0);
-  for (size_t j = 0; j < setup_->drives.size(); ++j) {
+  for (int j = 0; j < model().n_joints(); ++j) {
     if (!is_prescribed(setup_->drives[j].kind)) continue;
     const JointInfo& joint = model().joints[j];
-    const Force<double> load = transpose_times(joint.to_user, to_force(loads + 6 * j));
     for (int k = 0; k < joint.n_elements; ++k) {
       const Element& e = model().elements[joint.first_element + k];
-      const bool turns = e.kind != ElementKind::prismatic;
-      total_[e.v] = (turns ? load.ang.z : load.lin.z) + e.pitch * load.lin.z +
+      total_[e.v] = torque_of_load(joint, e, loads + 6 * j) +
                     model().dof_values(DofProperty::armature)[e.v] * du_[e.v];
     }
   }
+}
+
+/// What couplings put into joints of given motion is no torque of their drives.
+void Simulation::take_coupling_torques(std::span<const double> couplings) {
+  size_t k = 0;
+  for (const Coupling& coupling : model().couplings)
+    for (const Coupling::Term& term : coupling.terms) {
+      const double torque = k < couplings.size() ? couplings[k] : 0;
+      ++k;
+      if (!is_prescribed(setup_->drives[term.joint].kind)) continue;
+      if (term.closes)
+        forces_->loops()->take_coupling_torque(term.v, torque);
+      else
+        total_[term.v] -= torque;
+    }
 }
 
 /// Of an accepted state.
@@ -160,10 +193,7 @@ void Simulation::count_turns(double t, const double* y) {
   projected_.assign(y, y + size());
   to_state(projected_.data());
   impose(t, projected_.data());
-  SweepInput<double> in;
-  in.q = projected_.data();
-  passive_loops_->update(in, loop_q_.empty() ? nullptr : loop_q_.data());
-  loop_q_ = passive_loops_->q();
+  forces_->loops()->accepted(t, projected_.data(), rates_in(projected_.data()));
 }
 
 }  // namespace linkwise

@@ -8,7 +8,6 @@
 
 #include "linkwise/forces/passive.hpp"
 #include "linkwise/kinematics/frame_motion.hpp"
-#include "linkwise/kinematics/loop_states.hpp"
 
 namespace linkwise {
 namespace {
@@ -66,24 +65,6 @@ double passive_power(const Model& model, const double* q, const double* v) {
   add_passive_forces(model, q, rest.data(), resting.data());
   double power = 0;
   for (size_t i = 0; i < n; ++i) power += (moving[i] - resting[i]) * v[i];
-  return power;
-}
-
-/// The same of joints that close loops.
-double passive_power_of_loops(const Model& model, const double* q, const double* v) {
-  if (!has_passive_forces(model.loops)) return 0;
-  LoopStates loops(model);
-  SweepInput<double> in;
-  in.q = q;
-  in.v = v;
-  loops.update(in);
-  const size_t n = model.loops.nv;
-  std::vector<double> moving(n), resting(n);
-  const std::vector<double> rest(n);
-  add_passive_forces(model.loops, loops.q().data(), loops.v().data(), moving.data());
-  add_passive_forces(model.loops, loops.q().data(), rest.data(), resting.data());
-  double power = 0;
-  for (size_t i = 0; i < n; ++i) power += (moving[i] - resting[i]) * loops.v()[i];
   return power;
 }
 
@@ -197,8 +178,11 @@ void write_powers(const Model& model, const AppliedForces& forces, size_t member
                   const double* v, double* powers) {
   const size_t n = model.nv();
   for (size_t i = 0; i < n; ++i) powers[i] = forces.drive(member)[i] * v[i];
-  powers[n] = external_power(model, forces.external(member), q, v);
-  powers[n + 1] = -passive_power(model, q, v) - passive_power_of_loops(model, q, v);
+  const LoopForces* loops = forces.loops();
+  const size_t n_loops = model.loops.nv;
+  for (size_t i = 0; i < n_loops; ++i) powers[n + i] = loops->drive()[i] * loops->v()[i];
+  powers[n + n_loops] = external_power(model, forces.external(member), q, v);
+  powers[n + n_loops + 1] = -passive_power(model, q, v) + (loops ? loops->dissipated() : 0);
 }
 
 }  // namespace linkwise

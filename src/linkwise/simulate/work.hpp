@@ -7,8 +7,8 @@
 
 namespace linkwise {
 
-/// Works since the start, per member: of the drives, one per rate; then of the external wrenches;
-/// then what damping and friction took away. J.
+/// Works since the start, per member: of the drives, one per rate, then one per rate of loop
+/// joints; then of the external wrenches; then what damping and friction took away. J.
 ///
 /// Powers are evaluated at the Gauss-Legendre nodes of every step, from the dense output. Their
 /// quadrature is the work of the step; the polynomial through them gives that until a time within
@@ -21,7 +21,9 @@ class WorkIntegral {
   using Powers = std::function<bool(double t, double* powers)>;
   static constexpr int most_nodes = 13;
 
-  static size_t width(const Model& model) { return static_cast<size_t>(model.nv()) + 2; }
+  static size_t width(const Model& model) {
+    return static_cast<size_t>(model.nv()) + model.loops.nv + 2;
+  }
 
   WorkIntegral(const Model& model, size_t members, double t0);
 

@@ -81,7 +81,8 @@ inline ModelSpec row_of_four_bars(int n) {
 struct LoopedMachine {
   Model tree, model;  ///< without and with loops
   std::vector<double> q, v;
-  std::vector<double> q_loops;  ///< of loop joints where they were closed
+  std::vector<double> q_loops;            ///< of loop joints where they were closed
+  std::vector<double> v_given, du_given;  ///< of loop joints of given motion, else 0
 
   LoopedMachine(const ModelSpec& spec, Draws& draws) : tree(spec), model(spec) {
     MachineState state = random_state(tree, draws);
@@ -154,8 +155,33 @@ struct LoopedMachine {
     model.loops.joints.push_back(loop);
   }
 
-  /// Ties one-axis joints of the tree to each other, as they stand.
-  void couple(int n_terms, Draws& draws) {
+  /// From now on the motion of a loop joint is given: it goes on as it moves now, and faster.
+  void prescribe(int l, Draws& draws) {
+    LoopStates states(model);
+    SweepInput<double> in = input();
+    in.loop_q = q_loops.data();
+    states.update(in);
+    v_given.resize(model.loops.nv);
+    du_given.resize(model.loops.nv);
+    const JointInfo& joint = model.loops.joints[l].joint;
+    for (int i = joint.v; i < joint.v + joint.nv; ++i) {
+      v_given[i] = states.v()[i];
+      du_given[i] = draws.uniform(-1, 1);
+    }
+    for (int i = joint.first_element; i < joint.first_element + joint.n_elements; ++i)
+      model.loops.elements[i].prescribed = true;
+  }
+  /// Rotors on all coordinates of all loop joints, equal along those of one element.
+  void add_rotors(Draws& draws) {
+    for (const Element& e : model.loops.elements) {
+      const double inertia = draws.uniform(0.1, 2);
+      for (int i = e.v; i < e.v + e.nv; ++i)
+        model.loops.dof[static_cast<int>(DofProperty::armature)][i] = inertia;
+    }
+  }
+
+  /// Ties one-axis joints of the tree to each other, as they stand; curved: by polynomials.
+  void couple(int n_terms, Draws& draws, bool curved = false) {
     Coupling coupling;
     coupling.name = "coupling" + std::to_string(model.couplings.size());
     std::vector<int> joints;
@@ -165,7 +191,10 @@ struct LoopedMachine {
       const auto chosen = joints.begin() + draws.below(static_cast<int>(joints.size()));
       const JointInfo& joint = tree.joints[*chosen];
       coupling.terms.push_back({*chosen, joint.body, joint.q, joint.v, draws.uniform(0.3, 2)});
-      coupling.offset += coupling.terms.back().factor * q[joint.q];
+      Coupling::Term& term = coupling.terms.back();
+      if (curved)
+        for (double& x : term.higher) x = draws.uniform(-0.5, 0.5);
+      coupling.offset += term.value(q[joint.q]);
       joints.erase(chosen);
     }
     if (!coupling.terms.empty()) model.couplings.push_back(coupling);
@@ -185,6 +214,11 @@ struct LoopedMachine {
     SweepInput<double> in;
     in.q = q.data();
     in.v = v.data();
+    if (!v_given.empty()) {
+      in.loop_q = q_loops.data();
+      in.loop_v = v_given.data();
+      in.loop_du = du_given.data();
+    }
     return in;
   }
 
@@ -201,11 +235,11 @@ struct LoopedMachine {
       columns.push_back({});
       for (int l = 0; l < model.n_loops(); ++l)
         columns.back().insert(columns.back().end(), states[l].slip,
-                              states[l].slip + states[l].rows);
+                              states[l].slip + states[l].held);
       for (const Coupling& coupling : model.couplings) {
         columns.back().push_back(0);
         for (const Coupling::Term& term : coupling.terms)
-          if (term.v == k) columns.back().back() += term.factor;
+          if (term.v == k) columns.back().back() += term.slope(q[term.q]);
       }
       unit[k] = 0;
     }

@@ -85,14 +85,12 @@ Vector6<double> joint_motion(std::span<const Element> stack, const double* q, co
   return to_array(v);
 }
 
-/// By how much du misses the derivative of v_rel = P u in the directions that the loop holds.
-double violation(const LoopedMachine& machine, const LoopStates& states, int l,
-                 const std::vector<double>& du) {
+/// The derivative of v_rel, less that of P(q) u with u as it is: P du of a joint.
+Vector6<double> speeding(const LoopedMachine& machine, const LoopStates& states, int l,
+                         const std::vector<double>& du) {
   const LoopJoint& loop = machine.model.loops.joints[l];
-  const auto motions = WorldTwin(machine.tree).moved(machine.q, machine.v, du);
-  if (loop.kind == LoopKind::rod)
-    return std::abs(parting(machine, loop, motions).imag() / WorldTwin::step);
-  const auto moving = relative_motion(machine, loop, motions);
+  const auto moving =
+      relative_motion(machine, loop, WorldTwin(machine.tree).moved(machine.q, machine.v, du));
   const std::span<const Element> stack = stack_of(machine.model, loop);
   std::vector<double> rate(states.q().size());
   for (const Element& e : stack)
@@ -105,17 +103,57 @@ double violation(const LoopedMachine& machine, const LoopStates& states, int l,
   constexpr double h = 1e-3;
   const auto a1 = motion_at(h), b1 = motion_at(-h), a2 = motion_at(2 * h), b2 = motion_at(-2 * h),
              a3 = motion_at(3 * h), b3 = motion_at(-3 * h);
+  Vector6<double> found;
+  for (int k = 0; k < 6; ++k) {
+    const double turned = (45 * (a1[k] - b1[k]) - 9 * (a2[k] - b2[k]) + (a3[k] - b3[k])) / (60 * h);
+    found[k] = moving[k].imag() / WorldTwin::step - turned;
+  }
+  return found;
+}
+
+/// By how much du misses the derivative of v_rel = P u in the directions that the loop holds.
+double violation(const LoopedMachine& machine, const LoopStates& states, int l,
+                 const std::vector<double>& du) {
+  const LoopJoint& loop = machine.model.loops.joints[l];
+  if (loop.kind != LoopKind::joint)
+    return std::abs(
+        parting(machine, loop, WorldTwin(machine.tree).moved(machine.q, machine.v, du)).imag() /
+        WorldTwin::step);
+  const Vector6<double> moving = speeding(machine, states, l, du);
+  Vector6<double> given{};
+  if (!machine.du_given.empty())
+    given = joint_motion(stack_of(machine.model, loop), states.q().data(), machine.du_given.data());
   double worst = 0;
-  for (int i = 0; i < states[l].rows; ++i) {
+  for (int i = 0; i < states[l].held; ++i) {
     double sum = 0;
-    for (int k = 0; k < 6; ++k) {
-      const double turned =
-          (45 * (a1[k] - b1[k]) - 9 * (a2[k] - b2[k]) + (a3[k] - b3[k])) / (60 * h);
-      sum += states[l].basis.Q[i][k] * (moving[k].imag() / WorldTwin::step - turned);
-    }
+    for (int k = 0; k < 6; ++k) sum += states[l].basis.Q[i][k] * (moving[k] - given[k]);
     worst = std::max(worst, std::abs(sum));
   }
   return worst;
+}
+
+/// Torques of a loop's joint less what its rotors take: D du and, where the axes turn at w,
+/// w x (D u) of linear and angular rates. add_rotors() made D a number per element.
+std::vector<double> beside_rotors(const LoopedMachine& machine, const LoopStates& states, int l,
+                                  const std::vector<double>& du, std::vector<double> tau) {
+  const Vector6<double> moving = speeding(machine, states, l, du);
+  const auto& D = machine.model.loops.dof[static_cast<int>(DofProperty::armature)];
+  for (int k = 0; k < states[l].basis.n; ++k)
+    tau[states[l].dof[k]] -= D[states[l].dof[k]] * along(states[l].basis.dual[k], moving);
+  const double* u = states.v().data();
+  for (const Element& e : stack_of(machine.model, machine.model.loops.joints[l])) {
+    if (e.kind == ElementKind::planar) {
+      tau[e.v] += D[e.v] * u[e.v + 2] * u[e.v + 1];
+      tau[e.v + 1] -= D[e.v] * u[e.v + 2] * u[e.v];
+    } else if (e.kind == ElementKind::floating) {
+      const Vec3<double> bias = D[e.v] * cross(Vec3<double>{u[e.v + 3], u[e.v + 4], u[e.v + 5]},
+                                               Vec3<double>{u[e.v], u[e.v + 1], u[e.v + 2]});
+      tau[e.v] -= bias.x;
+      tau[e.v + 1] -= bias.y;
+      tau[e.v + 2] -= bias.z;
+    }
+  }
+  return tau;
 }
 
 /// What of the torques wanted is neither given nor that of any coupling.
@@ -125,7 +163,7 @@ std::vector<double> beside_couplings(const LoopedMachine& machine, std::vector<d
   const size_t n = couplings.size();
   std::vector<std::vector<double>> pull(n, std::vector<double>(wanted.size()));
   for (size_t i = 0; i < n; ++i)
-    for (const Coupling::Term& term : couplings[i].terms) pull[i][term.v] += term.factor;
+    for (const Coupling::Term& term : couplings[i].terms) pull[i][term.v] += term.slope(machine.q[term.q]);
   std::vector<double> A(n * n), b(n), s(n);
   for (size_t k = 0; k < wanted.size(); ++k) wanted[k] -= given[k];
   for (size_t i = 0; i < n; ++i)
@@ -185,22 +223,30 @@ void expect_motion(const LoopedMachine& machine, std::uint64_t seed, int want_ra
       }
   for (const Coupling& coupling : model.couplings) {
     double sum = 0;
-    for (const Coupling::Term& term : coupling.terms) sum += term.factor * du[term.v];
+    for (const Coupling::Term& term : coupling.terms) {
+      const double x = machine.q[term.q], u = machine.v[term.v];
+      sum += term.slope(x) * du[term.v] + term.curvature(x) * u * u;
+    }
     EXPECT_NEAR(sum, 0, 1e-10 * size) << coupling.name;
   }
   for (size_t i = 0; i < want.loads.size(); ++i)
     EXPECT_NEAR(loads[i], want.loads[i], 1e-10 * largest) << "load " << i;
-  // What a loop joint transmits along its own columns is what drives it.
+  // What a loop joint transmits along its own columns is what drives it, less what rotors take.
   for (int l = 0; l < model.n_loops(); ++l) {
     const LoopJoint& loop = model.loops.joints[l];
+    const std::vector<double> driven =
+        loop.kind != LoopKind::joint ? loop_tau : beside_rotors(machine, kernel.states(), l, du, loop_tau);
     const std::span<const Element> stack = stack_of(model, loop);
     const Vector6<double> w = to_array(transpose_times(
         loop.joint.to_user, to_force(&loads[6 * (static_cast<size_t>(model.n_joints()) + l)])));
     std::vector<double> unit(model.loops.nv);
     for (int k = loop.joint.v; k < loop.joint.v + loop.joint.nv; ++k) {
       unit[k] = 1;
-      EXPECT_NEAR(along(joint_motion(stack, kernel.states().q().data(), unit.data()), w),
-                  loop_tau[k], 1e-10 * largest);
+      const double transmitted =
+          along(joint_motion(stack, kernel.states().q().data(), unit.data()), w);
+      if (!stack[0].prescribed) {
+        EXPECT_NEAR(transmitted, driven[k], 1e-9 * largest);
+      }
       unit[k] = 0;
     }
   }
@@ -211,22 +257,56 @@ void expect_motion(const LoopedMachine& machine, std::uint64_t seed, int want_ra
   for (int k = 0; k < model.nv(); ++k) EXPECT_NEAR(again[k], du[k], 1e-11 * size);
 }
 
+/// A machine of two branches that a loop joint of some type closes.
+LoopedMachine two_branches(JointType type, bool to_ground) {
+  Draws draws(to_ground ? 31 : 32);
+  LoopedMachine machine(tree_spec({JointType::revolute, JointType::universal, JointType::spherical,
+                                   JointType::prismatic, JointType::spherical, JointType::revolute,
+                                   JointType::universal, JointType::spherical},
+                                  {-1, 0, 1, 2, 1, 4, 5, 6}, draws),
+                        draws);
+  machine.close(type, to_ground ? -1 : 7, 3, draws);
+  return machine;
+}
+
 TEST(ArticulatedLoops, EveryJointTypeClosesALoop) {
   for (const JointType type : all_joint_types) {
     if (type == JointType::composite) continue;
     SCOPED_TRACE(joint_type_name(type));
     for (const bool to_ground : {true, false}) {
-      Draws draws(to_ground ? 31 : 32);
-      LoopedMachine machine(
-          tree_spec({JointType::revolute, JointType::universal, JointType::spherical,
-                     JointType::prismatic, JointType::spherical, JointType::revolute,
-                     JointType::universal, JointType::spherical},
-                    {-1, 0, 1, 2, 1, 4, 5, 6}, draws),
-          draws);
-      machine.close(type, to_ground ? -1 : 7, 3, draws);
+      LoopedMachine machine = two_branches(type, to_ground);
       const int rank = machine.make_consistent();
       EXPECT_EQ(rank, 6 - machine.model.loops.joints[0].joint.nv);
       expect_motion(machine, 5, rank);
+    }
+  }
+}
+
+TEST(ArticulatedLoops, RotorsOnLoopJoints) {
+  for (const JointType type : all_joint_types) {
+    if (type == JointType::composite) continue;
+    SCOPED_TRACE(joint_type_name(type));
+    for (const bool to_ground : {true, false}) {
+      Draws draws(77);
+      LoopedMachine machine = two_branches(type, to_ground);
+      machine.add_rotors(draws);
+      const int rank = machine.make_consistent();
+      EXPECT_EQ(rank, 6 - machine.model.loops.joints[0].joint.nv);
+      expect_motion(machine, 5, rank);
+    }
+  }
+}
+
+TEST(ArticulatedLoops, GivenMotionsOfLoopJoints) {
+  for (const JointType type : all_joint_types) {
+    if (type == JointType::composite) continue;
+    SCOPED_TRACE(joint_type_name(type));
+    for (const bool to_ground : {true, false}) {
+      Draws draws(78);
+      LoopedMachine machine = two_branches(type, to_ground);
+      machine.make_consistent();
+      machine.prescribe(0, draws);
+      expect_motion(machine, 5, 6);
     }
   }
 }
@@ -264,7 +344,7 @@ TEST(ArticulatedLoops, CouplingsTieJointsAnywhere) {
       continue;  // a massless link at a tip
     }
     if (!machine->tree.undetermined().empty()) continue;
-    for (int c = 0; c < 1 + sample % 3; ++c) machine->couple(1 + draws.below(4), draws);
+    for (int c = 0; c < 1 + sample % 3; ++c) machine->couple(1 + draws.below(4), draws, sample % 2 == 0);
     const int bodies = machine->tree.n_bodies();
     if (sample % 2) machine->close(spherical, draws.below(bodies - 1), bodies - 1, draws);
     expect_motion(*machine, sample, machine->make_consistent());

@@ -1,0 +1,99 @@
+#include "linkwise/simulate/loop_forces.hpp"
+
+#include <algorithm>
+
+#include "linkwise/forces/passive.hpp"
+
+namespace linkwise {
+
+LoopForces::LoopForces(const Setup& setup)
+    : setup_(setup),
+      loops_(setup.driven().loops),
+      states_(setup.driven()),
+      passive_(has_passive_forces(loops_)),
+      near_q_(loops_.nq),
+      given_v_(loops_.nv),
+      given_du_(loops_.nv),
+      tau_(loops_.nv),
+      drive_(loops_.nv) {}
+
+void LoopForces::hold(const double* q) {
+  LoopStates free(*setup_.model);
+  SweepInput<double> in;
+  in.q = q;
+  free.update(in);
+  near_q_ = free.q();
+}
+
+void LoopForces::give(double t) {
+  for (int l = 0; l < setup_.model->n_loops(); ++l) {
+    const Drive& drive = setup_.drives[setup_.model->n_joints() + l];
+    if (drive.kind != DriveKind::motion) continue;
+    const JointInfo& joint = loops_.joints[l].joint;
+    evaluate_motion(joint, drive, t, &near_q_[joint.q], &given_v_[joint.v], &given_du_[joint.v]);
+  }
+}
+
+void LoopForces::give_to(SweepInput<double>& in) const {
+  in.loop_q = near_q();
+  in.loop_v = given_v();
+  in.loop_du = given_du_.data();
+}
+
+void LoopForces::update(double t, const double* q, const double* v) {
+  give(t);
+  SweepInput<double> in;
+  in.q = q;
+  in.v = v;
+  give_to(in);
+  states_.update(in);
+}
+
+void LoopForces::evaluate(double t, const double* q, const double* v) {
+  update(t, q, v);
+  std::fill(tau_.begin(), tau_.end(), 0.0);
+  for (int l = 0; l < setup_.model->n_loops(); ++l)
+    add_drive_torque(loops_.joints[l].joint, loops_.elements,
+                     setup_.drives[setup_.model->n_joints() + l], t, this->q(), this->v(),
+                     tau_.data());
+  drive_ = tau_;
+  if (passive_) add_passive_forces(loops_, this->q(), this->v(), tau_.data());
+}
+
+void LoopForces::accepted(double t, const double* q, const double* v) {
+  update(t, q, v);
+  near_q_ = states_.q();
+}
+
+void LoopForces::add_holding_torques(const double* loads) {
+  const int n = setup_.model->n_joints();
+  const auto& armature = loops_.dof[static_cast<int>(DofProperty::armature)];
+  for (int l = 0; l < setup_.model->n_loops(); ++l) {
+    if (!is_prescribed(setup_.drives[n + l].kind)) continue;
+    const JointInfo& joint = loops_.joints[l].joint;
+    for (int k = joint.first_element; k < joint.first_element + joint.n_elements; ++k) {
+      const Element& e = loops_.elements[k];
+      drive_[e.v] += torque_of_load(joint, e, loads + 6 * (n + l)) +
+                     armature[e.v] * given_du_[e.v] - tau_[e.v];
+    }
+  }
+}
+
+double LoopForces::dissipated() const {
+  if (!passive_) return 0;
+  std::vector<double> moving(loops_.nv), resting(loops_.nv);
+  const std::vector<double> rest(loops_.nv);
+  add_passive_forces(loops_, q(), v(), moving.data());
+  add_passive_forces(loops_, q(), rest.data(), resting.data());
+  double power = 0;
+  for (int i = 0; i < loops_.nv; ++i) power -= (moving[i] - resting[i]) * v()[i];
+  return power;
+}
+
+double torque_of_load(const JointInfo& joint, const Element& element, const double* load) {
+  const Force<double> own = transpose_times(joint.to_user, to_force(load));
+  const bool turns = element.kind != ElementKind::prismatic;
+  return (turns ? own.ang.z : own.lin.z) + element.pitch * own.lin.z;
+}
+
+}  // namespace linkwise

@@ -1,0 +1,210 @@
+"""Joints that close loops, with drives, rotors and given motions: against the same machine whose
+loop is cut at another joint."""
+
+import numpy as np
+import pytest
+
+import linkwise as lw
+
+Z = (0, 0, 1)
+CORNERS = {"a": (0.0, 0.0), "b": (0.3, 0.9), "c": (1.4, 1.1), "d": (1.2, 0.0)}
+BARS = {"crank": "ab", "coupler": "bc", "rocker": "cd"}
+DRIVEN = "abcd"
+
+
+def point(corner):
+    return np.array([*CORNERS[corner], 0.0])
+
+
+def four_bar(cut, *, slider=False, coupling=None, **properties):
+    """A four-bar in the plane z = 0, or a slider-crank whose last joint slides; the joint `cut`, c
+    or d, closes its loop. properties: by joint. Link frames are parallel to the world's. coupling:
+    factors, of which those of `wheel` are of a wheel on the coupler."""
+    ends = {"a": ("base", "crank"), "b": ("crank", "coupler"), "c": ("coupler", "rocker")}
+    ends["d"] = ("base", "rocker")
+    origin = {"base": "a", "crank": "a", "coupler": "b", "rocker": "d" if cut == "c" else "c"}
+    builder = lw.ModelBuilder("four-bar", gravity=(0.7, -9.81, 0))
+    builder.add_link("base", mass=0)
+    for k, (link, (first, last)) in enumerate(BARS.items()):
+        builder.add_link(
+            link,
+            mass=1 + 0.3 * k,
+            com=(point(first) + point(last)) / 2 - point(origin[link]),
+            inertia=np.diag([0.03, 0.04, 0.05 + 0.01 * k]),
+        )
+    for name, (parent, child) in ends.items():
+        kind = "prismatic" if slider and name == "d" else "revolute"
+        where = {
+            "translation": point(name) - point(origin[parent]),
+            "axis": (1, 0.2, 0) if kind == "prismatic" else Z,
+        }
+        if name == cut:
+            where["child_translation"] = point(name) - point(origin[child])
+            builder.add_loop(name, kind, parent, child, **where, **properties.get(name, {}))
+        else:
+            builder.add_joint(name, kind, parent, child, **where, **properties.get(name, {}))
+    if coupling:
+        builder.add_link("wheel", mass=0.5, inertia=0.2 * np.eye(3))
+        builder.add_joint("wheel", "revolute", "coupler", "wheel", axis=Z)
+        builder.add_coupling("gear", coupling)
+    return builder.build()
+
+
+def of_joint(run, quantity, name):
+    """A quantity of any joint, of the tree or not."""
+    tree = run.dataset[quantity]
+    dim = tree.dims[1]
+    if name in tree[dim].values:
+        return tree.sel({dim: name}).values
+    loop = run.dataset[f"loop_{quantity}"]
+    return loop.sel({loop.dims[1]: name}).values
+
+
+def assert_same_runs(runs, *, bound=2e-7):
+    for quantity in ("position", "velocity", "drive_torque", "drive_work"):
+        for name in "abcd":
+            first, second = (of_joint(run, quantity, name) for run in runs)
+            np.testing.assert_allclose(
+                second,
+                first,
+                rtol=0,
+                atol=bound * (1 + np.abs(first).max()),
+                err_msg=(quantity, name),
+            )
+    for name in "abcd":  # forces in the plane and the moment about the axis are determined
+        first, second = (run.joint_load.sel(joint=name).values[:, [0, 1, 5]] for run in runs)
+        size = 1 + np.abs(first).max()
+        np.testing.assert_allclose(second, first, rtol=0, atol=10 * bound * size, err_msg=name)
+    for run in runs:
+        balance = lw.loads.energy_balance(run)
+        size = 1 + np.abs(balance.kinetic_energy).max() + np.abs(balance.drive_work).max()
+        assert np.abs(balance.residual).max() < 1e-7 * size
+
+
+def simulate_both(drives, *, slider=False, spin=0.0, properties=None, coupling=None, **options):
+    runs = []
+    for cut in "cd":
+        model = four_bar(cut, slider=slider, coupling=coupling, **(properties or {}))
+        v0 = np.where(np.array(model.joint_names) == "a", spin, 0.0)
+        v0 = lw.assemble(model, None, v0, hold=["a"] if spin else []).v
+        options = {"duration": 0.8, "every": 0.1, "tolerance": 1e-10} | options
+        runs.append(lw.simulate(model, drives=drives, v0=v0, **options))
+    return runs
+
+
+TABLE = lw.Table([0, 0.3, 0.5, 2], [[0], [12], [-5], [4]])
+FORCES = {
+    "constant": {"d": 4.0, "c": -3.0},
+    "table": {"d": lw.Torque(TABLE)},
+    "function": {"c": lambda t, q, v: 5 * np.sin(9 * t) - 2 * q[0] - 0.3 * v[0]},
+    "pd": {"c": lw.PD(kp=30.0, kd=0.5, target=0.4), "d": lw.PD(kp=20.0, kd=0.2, target=-0.2)},
+}
+
+
+@pytest.mark.parametrize("kind", FORCES)
+@pytest.mark.parametrize("slider", [False, True])
+def test_drives_act_where_the_loop_is_cut_as_elsewhere(kind, slider):
+    runs = simulate_both(FORCES[kind], slider=slider, spin=1.0)
+    assert_same_runs(runs)
+    driven = max(np.abs(of_joint(runs[0], "drive_torque", name)).max() for name in "cd")
+    assert driven > 1
+
+
+@pytest.mark.parametrize("slider", [False, True])
+def test_rotors_turn_where_the_loop_is_cut_as_elsewhere(slider):
+    properties = {"c": {"armature": 0.7}, "d": {"armature": 0.4, "damping": 0.3}}
+    runs = simulate_both({"a": 6.0}, slider=slider, spin=2.0, properties=properties)
+    assert_same_runs(runs)
+    plain = simulate_both({"a": 6.0}, slider=slider, spin=2.0)[0]
+    slower = np.abs(of_joint(plain, "position", "a") - of_joint(runs[0], "position", "a")).max()
+    assert slower > 0.1  # they matter
+
+
+@pytest.mark.parametrize(
+    "factors", [{"c": 1, "wheel": -2}, {"c": [0.5, 0.3, -0.2], "d": [0, 0.4], "wheel": 1.0}]
+)
+@pytest.mark.parametrize("driven", [{"a": 5.0}, {"c": lw.PD(kp=30.0, kd=0.5, target=0.4)}])
+def test_couplings_of_joints_where_the_loop_is_cut(factors, driven):
+    runs = simulate_both(driven, spin=1.0, coupling=factors, properties={"c": {"armature": 0.3}})
+    assert_same_runs(runs)
+    first, second = (run["coupling_load"] for run in runs)
+    assert first.coupled.values.tolist() == [f"gear:{joint}" for joint in factors]
+    np.testing.assert_allclose(second.values, first.values, atol=1e-6)
+    assert np.abs(first.values).max() > 0.1
+
+
+def test_a_motion_that_a_coupling_loads_where_the_loop_is_cut():
+    motion = lw.Motion(lambda t: (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t)))
+    runs = simulate_both({"c": motion}, coupling={"c": 1, "wheel": -2})
+    assert_same_runs(runs)
+
+
+@pytest.mark.parametrize("joint", ["c", "d"])
+@pytest.mark.parametrize("slider", [False, True])
+def test_given_motions_are_followed_where_the_loop_is_cut(joint, slider):
+    size = 0.1 if slider else 0.4
+    motion = lw.Motion(
+        lambda t: (size * np.sin(2 * t), 2 * size * np.cos(2 * t), -4 * size * np.sin(2 * t))
+    )
+    properties = {joint: {"armature": 0.7, "damping": 0.2}}
+    runs = simulate_both({joint: motion, "a": -2.0}, slider=slider, properties=properties)
+    assert_same_runs(runs)
+    for run in runs:
+        followed = of_joint(run, "position", joint)
+        np.testing.assert_allclose(followed, size * np.sin(2 * run.time.values), atol=1e-11)
+
+
+@pytest.mark.parametrize("joint", ["c", "d"])
+def test_locked_joints_hold_the_machine_where_the_loop_is_cut(joint):
+    runs = simulate_both({joint: lw.Locked(), "a": 3.0})
+    assert_same_runs(runs)
+    for run in runs:
+        assert np.ptp(of_joint(run, "position", "a")) < 1e-11
+        assert np.abs(of_joint(run, "drive_torque", joint)).min() > 1
+
+
+def test_motions_that_contradict_each_other_are_refused():
+    def turning(rate):
+        return lw.Motion(lambda t: (rate * t, rate, 0.0))
+
+    model = four_bar("c")
+    with pytest.raises(lw.InputError, match=r"'a' and 'c' contradict each other.*loop.*'c'"):
+        lw.simulate(model, duration=1, drives={"a": turning(1.0), "c": turning(1.0)})
+    with pytest.raises(lw.InputError, match=r"'a' and 'd' contradict each other.*loop.*'c'"):
+        lw.simulate(
+            model, duration=1, drives={"a": turning(1.0), "d": lw.Motion(lambda t: (0.3, 0.0, 0.0))}
+        )
+
+
+def test_turns_of_loop_joints_are_counted():
+    """A wheel on a crank, whose pin slides in a slot: the loop joint turns with the crank."""
+    builder = lw.ModelBuilder("slot", gravity=(0, 0, 0))
+    builder.add_link("base", mass=0)
+    builder.add_link("crank", mass=1, com=(0.1, 0, 0), inertia=np.diag([0.1, 0.1, 0.2]))
+    builder.add_link("block", mass=1, inertia=np.diag([0.1, 0.1, 0.2]))
+    builder.add_link("yoke", mass=1, inertia=np.diag([0.1, 0.1, 0.2]))
+    builder.add_joint("turn", "revolute", "base", "crank", axis=Z)
+    builder.add_joint("yoke", "prismatic", "base", "yoke", axis=(1, 0, 0))
+    builder.add_joint("slot", "prismatic", "yoke", "block", axis=(0, 1, 0))
+    builder.add_loop(
+        "pin", "revolute", "crank", "block", axis=Z, translation=(0.2, 0, 0), stiffness=0.5
+    )
+    model = builder.build()
+    q0, v0 = np.zeros(3), np.zeros(3)
+    q0[model.q_slice("yoke")] = 0.2
+    v0[model.v_slice("turn")] = 20.0
+    run = lw.simulate(model, duration=3, q0=q0, v0=v0, tolerance=1e-9)
+    turn, pin = of_joint(run, "position", "turn"), of_joint(run, "position", "pin")
+    np.testing.assert_allclose(pin, -turn, atol=1e-7)
+    assert np.abs(turn).max() > 10
+    assert np.abs(lw.loads.energy_balance(run).residual).max() < 1e-6
+    assert run.dataset.loop_position.attrs["units"] == "rad"
+
+
+def test_rods_take_no_drive():
+    length = float(np.linalg.norm(point("b")))
+    model = four_bar("c").with_rod("rod", "base", "coupler", length=length)
+    assert model.loop_types == ["revolute", "rod"]
+    for drive in (1.0, lw.Locked(), lw.PD(kp=1.0, kd=1.0, target=0.0)):
+        with pytest.raises(lw.InputError, match=r"joint 'rod'.*no coordinate to drive"):
+            lw.simulate(model, duration=1, drives={"rod": drive})
