@@ -257,8 +257,9 @@ Args:
 
 Raises:
     InputError: the length is negative, a property is unknown, or an array has another shape.)")
-      .def("add_coupling", &add_coupling, "name"_a, "factors"_a, nb::kw_only(), "offset"_a = 0.0,
-           R"(Ties coordinates of joints together, as gears, racks, screws, differentials and cams do.
+      .def(
+          "add_coupling", &add_coupling, "name"_a, "factors"_a, nb::kw_only(), "offset"_a = 0.0,
+          R"(Ties coordinates of joints together, as gears, racks, screws, differentials and cams do.
 
 The sum of factor times coordinate is offset at all times; a list of factors is that of a polynomial
 without a constant, of the coordinate and its second, third and fourth power. The coupling's load,

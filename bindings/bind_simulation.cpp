@@ -197,6 +197,13 @@ void bind_simulation(nb::module_& m) {
       .def_prop_ro(
           "assembled", [](const PySimulation& s) { return s.simulation.assembled(); },
           "What closing the loops changed at the start, one line; empty: nothing.")
+      .def_prop_ro(
+          "start_position",
+          [](const PySimulation& s) {
+            const auto& state = s.simulation.start_state();
+            return to_numpy({state.begin(), state.begin() + s.model->nq()});
+          },
+          "Coordinates (nq,) that it started from, loops closed.")
       .def("advance", &advance, "times"_a, "quantities"_a = nb::none(),
            "The samples at times [s], which increase: a dictionary of the time and of the arrays "
            "(time, ...) of\n"

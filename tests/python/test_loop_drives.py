@@ -208,3 +208,26 @@ def test_rods_take_no_drive():
     for drive in (1.0, lw.Locked(), lw.PD(kp=1.0, kd=1.0, target=0.0)):
         with pytest.raises(lw.InputError, match=r"joint 'rod'.*no coordinate to drive"):
             lw.simulate(model, duration=1, drives={"rod": drive})
+
+
+def test_members_of_a_batch_are_single_runs():
+    model = four_bar("c", coupling={"c": 1, "wheel": -2})
+    drives = {"c": lw.PD(kp=30.0, kd=0.5, target=0.4)}
+    options = {"duration": 0.2, "every": 0.05, "integrator": "runge_kutta_4", "step": 1e-3}
+    batch = lw.simulate_batch(model, drives=drives, v0=np.zeros((2, 4)), **options)
+    single = lw.simulate(model, drives=drives, **options)
+    for name in ("loop_position", "loop_drive_torque", "coupling_load"):
+        np.testing.assert_array_equal(batch[name].values[1], single[name].values)
+
+
+def test_peaks_of_drive_power_where_the_loop_is_cut():
+    runs = simulate_both(FORCES["pd"], spin=1.0)
+    for run, other in (runs, runs[::-1]):
+        peaks = lw.loads.peaks(run, model=None)
+        assert set(peaks.joint.values) == set("abcd")
+        power = [lw.loads.quantities(r)["drive_power"].sel(joint="c").values for r in (run, other)]
+        np.testing.assert_allclose(power[0], power[1], atol=1e-5)
+        assert np.abs(power[0]).max() > 0.1
+    found = [run["extreme_quantity"].sel(quantity="drive_power") for run in runs]
+    for name in "cd":
+        np.testing.assert_allclose(*(x.sel(joint=name).values for x in found), atol=1e-4)

@@ -28,6 +28,14 @@ class Assembly(NamedTuple):
     released: tuple[str, ...]
 
 
+def held_joints(hold: Sequence[str]) -> list[str]:
+    """Names of joints that assembly leaves where they are."""
+    named = not isinstance(hold, str) and isinstance(hold, Sequence)
+    if not named or not all(isinstance(name, str) for name in hold):
+        raise InputError(f"hold: {shown(hold)} given; give a list of names of joints")
+    return list(hold)
+
+
 def assemble(
     model: Model,
     q0: npt.ArrayLike | None = None,
@@ -51,12 +59,10 @@ def assemble(
         InputError: no position was found; the message says which loop stays open by how much. Or
             the rates of held joints contradict each other.
     """
-    if isinstance(hold, str) or not all(isinstance(name, str) for name in hold):
-        raise InputError(f"hold: {shown(hold)} given; give a list of names of joints")
     found = _core.assemble(
         model,
         state_vector("q0", q0, model.nq, model.initial_configuration()),
         state_vector("v0", v0, model.nv, np.zeros(model.nv)),
-        list(hold),
+        held_joints(hold),
     )
     return Assembly(found["q"], found["v"], found["gap"], tuple(found["released"]))

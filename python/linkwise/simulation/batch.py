@@ -171,8 +171,9 @@ def _add_determinate(
     positions, states = columns["position"], columns.get("extreme_state")
     each = len(positions) // len(models)
     for member, path in enumerate(positions):
-        start = rows["q0"][member], rows["v0"][member]
-        seen = Determinacy(models[member // each], *start, len(path))
+        model = models[member // each]
+        start = _core.assemble(model, rows["q0"][member], rows["v0"][member], [])["q"]
+        seen = Determinacy(model, start, len(path))
         seen.see(path)
         seen.see_peaks(None if states is None else states[member])
         known.append(seen.throughout)

@@ -41,11 +41,11 @@ class Determinacy:
 
     Args:
         model: the machine; one that `is_looked_at`.
-        q: (nq,) [rad, m]; v: (nv,) [rad/s, m/s]: the start, which is assembled first.
+        q: (nq,) [rad, m]: the start, which closes all loops.
         samples: how many positions `see` will be given.
     """
 
-    def __init__(self, model: Model, q: npt.ArrayLike, v: npt.ArrayLike, samples: int) -> None:
+    def __init__(self, model: Model, q: AnyArray, samples: int) -> None:
         self._model = model
         small = _rows(model) <= _FEW_ROWS
         poses = min(samples, _POSES if small else 2)
@@ -55,7 +55,7 @@ class Determinacy:
         self._open = np.zeros((model.n_joints + model.n_loops, len(COMPONENTS)), dtype=np.int64)
         self._count = 0
         self._self_stresses = 0
-        self._classify(_core.assemble(model, q, v, [])["q"])
+        self._classify(q)
 
     @property
     def throughout(self) -> AnyArray:

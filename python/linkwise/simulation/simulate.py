@@ -34,6 +34,7 @@ from linkwise.simulation.arguments import (
     sample_times,
     state_vector,
 )
+from linkwise.simulation.assembling import held_joints
 from linkwise.simulation.determinacy import Determinacy, is_looked_at, not_looked_at
 from linkwise.simulation.numerics import DEFAULTS, Numerics
 from linkwise.simulation.recording import Recording
@@ -378,6 +379,7 @@ def simulate(
     tolerance: float | None = None,
     numerics: Numerics | Mapping[str, Any] | None = None,
     threads: int | None = None,
+    hold: Sequence[str] = (),
     record: Recording | Mapping[str, Any] | Collection[str] | None = None,
     output: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
@@ -405,6 +407,8 @@ def simulate(
             default.
         numerics: Integrator, step, method, solver and the rarer options: a `Numerics`, or a
             dictionary. `linkwise.numerics()` lists all with their defaults.
+        hold: Joints that closing the loops of the start leaves where `q0` has them; where loops do
+            not close so, they are released, the last one first, and `run.warnings` says so.
         threads: Worker threads; the results do not depend on it.
         record: Names of the quantities to record, such as `["joint_load", "position"]`, or a
             `Recording`, which also picks joints; everything by default.
@@ -457,7 +461,7 @@ def simulate(
     notes = set_driven(simulation, model, by_joint, by_name, float(sampled[-1]), start)
     if schema.extremes:
         simulation.keep_extremes(joint_directions(model))
-    simulation.start(0.0, *start)
+    simulation.start(0.0, *start, hold=held_joints(hold))
     attrs = provenance(
         model,
         options={
@@ -473,7 +477,9 @@ def simulate(
     )
     attrs |= _chosen(simulation, by_joint, by_name)
     notes += _of_loops(simulation, model, schema)
-    determinacy = Determinacy(model, *start, sampled.size) if schema.determinate else None
+    determinacy = (
+        Determinacy(model, simulation.start_position, sampled.size) if schema.determinate else None
+    )
     ignored = [*notes, *_coarse_solver(simulation, options), *warnings_of(model)]
     attrs |= warning_attrs([*ignored, *_open(determinacy)])
     if output is None:

@@ -13,6 +13,7 @@ struct MachineGraph {
     bool acts = false;
     bool weld = false;    ///< makes one piece of its two links
     bool closes = false;  ///< is a loop joint, whatever the links hang on
+    bool stays = false;   ///< cannot close a loop: another joint has to
   };
   int ground = 0;              ///< the link that does not move; what hangs on it comes first
   std::vector<char> massless;  ///< by link: has neither mass nor inertia

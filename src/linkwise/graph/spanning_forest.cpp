@@ -78,9 +78,9 @@ class Choice {
   }
 
   /// What is lost if a joint is left out, the most important first.
-  std::tuple<bool, int, int, int> price(int j) const {
+  std::tuple<bool, bool, int, int, int> price(int j) const {
     const auto& joint = graph_.joints[j];
-    return {joint.acts, -joint.freedom, -depth_[joint.parent], -j};
+    return {joint.stays, joint.acts, -joint.freedom, -depth_[joint.parent], -j};
   }
 
   const MachineGraph& graph_;

@@ -193,8 +193,7 @@ void LoopStates::update_distance(int l, const Transform<double>& X_FE, const Mot
     out.dof[0] = loop.joint.v;
     q_[loop.joint.q] = distance - loop.length;
     v_[loop.joint.v] = dot(n, relative);
-    const double I =
-        model_.loops.dof[static_cast<int>(DofProperty::armature)][loop.joint.v];
+    const double I = model_.loops.dof[static_cast<int>(DofProperty::armature)][loop.joint.v];
     if (!(I > 0)) return;
     out.rows = 1;
     out.yields[0] = 1 / I;

@@ -143,8 +143,8 @@ Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::s
       const LoopKind kind = spec.loop_joints[i - spec.joints.size()].kind;
       dof = kind == LoopKind::spring ? 6 : kind == LoopKind::rod ? 5 : dof;
     }
-    graph.joints.push_back(
-        {parent, child, dof, acts(j), !closes && j.type == JointType::fixed, closes});
+    graph.joints.push_back({parent, child, dof, acts(j), !closes && j.type == JointType::fixed,
+                            closes, j.type == JointType::composite});
   }
   if (spec.keep_fixed) {
     const std::vector<char> carries = links_that_carry(graph);
@@ -178,7 +178,8 @@ void check_forest(const Machine& machine, const SpanningForest& forest, const Lu
       throw InputError("joint '" + machine.joint(j).name + "'" + machine.where +
                        " is composite and closes a loop of joints " +
                        names_of(machine, loop_of(graph, forest, j)) +
-                       "; let a joint of another type close it");
+                       "; let a joint of another type lead to link '" +
+                       machine.link_name(graph.joints[j].child) + "', which then closes the loop");
   }
   if (forest.roots.size() == 1) return;
   for (int j : forest.loop_joints)

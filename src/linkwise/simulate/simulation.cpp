@@ -45,6 +45,7 @@ void Simulation::start(double t0, const Start& start) {
   for (size_t i = 0; i < members_; ++i) check_quaternions(m, y_.data() + i * nq());
   close_loops(t0, start.hold);
   if (LoopForces* loops = forces_->loops()) loops->accepted(t0, y_.data(), rates_in(y_.data()));
+  start_state_ = y_;
   endings_.assign(members_, {Outcome::converged, t0, "", ""});
   failure_ = {};
   iterations_ = 0;

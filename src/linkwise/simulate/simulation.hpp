@@ -94,6 +94,8 @@ class Simulation : private OdeSystem {
   void set_observer(EvaluationObserver* observer) { observer_ = observer; }
   /// What closing the loops changed at the start, one line; empty: nothing.
   const std::string& assembled() const { return assembled_; }
+  /// The state of one member that it started from, [nq + nv].
+  const std::vector<double>& start_state() const { return start_state_; }
   /// What is integrated in place of coordinates and joint rates; null: these.
   const IntegratedState* integrated_state() const { return state_.get(); }
 
@@ -190,6 +192,7 @@ class Simulation : private OdeSystem {
   std::unique_ptr<SolverTolerance> solver_tolerance_;  ///< of one member; null: a fixed one
   std::unique_ptr<LoopProjection> loops_;              ///< null: there are none
   std::string assembled_;
+  std::vector<double> start_state_;
   Coasting coasting_;
   LoopReport loop_report_;  ///< of the last evaluation
   std::vector<double> steered_;

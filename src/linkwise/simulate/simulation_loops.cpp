@@ -121,7 +121,8 @@ void Simulation::evaluate_for(Extremes& extremes) {
          const LoopForces& loops = *forces_->loops();
          const JointInfo& joint = model().loops.joints[l].joint;
          double power = 0;
-         for (int i = joint.v; i < joint.v + joint.nv; ++i) power += loops.drive()[i] * loops.v()[i];
+         for (int i = joint.v; i < joint.v + joint.nv; ++i)
+           power += loops.drive()[i] * loops.v()[i];
          return power;
        }});
 }

@@ -70,6 +70,11 @@ TEST(SpanningForest, AFourBarIsCutWhereItIsCheapest) {
   graph.joints[1].acts = true;  // but not when its coordinates are needed
   forest = make_spanning_forest(graph);
   EXPECT_EQ(forest.loop_joints, Indices{3});
+
+  graph.joints[3].stays = true;  // nor where the other one cannot close a loop
+  forest = make_spanning_forest(graph);
+  check_forest(graph, forest);
+  EXPECT_EQ(forest.loop_joints, Indices{1});
 }
 
 TEST(SpanningForest, ALoopIsCutFarFromTheGround) {

@@ -138,9 +138,10 @@ const Wrong wrong_joints[] = {
      [](ModelSpec& s) {
        s.joints.push_back(joint("extra", JointType::composite, "base", "lower"));
        s.joints.back().axes.assign(4, {});
+       s.joints[1].type = JointType::composite;
      },
      "joint 'extra' of arm.urdf is composite and closes a loop of joints 'extra', 'elbow' and "
-     "'shoulder'; let a joint of another type close it"},
+     "'shoulder'; let a joint of another type lead to link 'lower', which then closes the loop"},
     {"two_roots", [](ModelSpec& s) { s.joints.pop_back(); },
      "links 'base' and 'lower' of arm.urdf both have no parent; a model has one root: join them "
      "with a joint"},

@@ -113,11 +113,42 @@ def test_what_is_wrong_is_one_line(write, complaint, old, new, said):
     assert message.startswith(f": {said}"), message
 
 
-def test_a_drive_cannot_turn_it(write, complaint):
-    path = write(LOOP + '[drive.brace]\nkind = "torque"\nvalue = 1\n')
-    scenario = load_scenario(path)
-    message = complaint(lambda _: scenario.simulate_arguments(scenario.load_model()), path)
-    assert "joint 'brace' closes a loop: it moves as the others do" in message
+DRIVE = """[drive.brace]
+kind = "torque"
+value = "2 N m"
+"""
+
+
+def test_a_drive_turns_it(write):
+    """As it does where another joint closes the loop: the power is torque times rate."""
+    run = lw.run_scenario(write(LOOP + DRIVE + "[output]\nevery = 0.1\n"))
+    torque, rate = run["loop_drive_torque"], run["loop_velocity"]
+    assert torque.attrs["units"] == "N m"
+    np.testing.assert_array_equal(torque.sel(loop_dof="brace"), 2.0)
+    turned = run["loop_position"].sel(loop_coordinate="brace").values
+    work = run["loop_drive_work"].sel(loop_dof="brace").values
+    np.testing.assert_allclose(work, 2 * (turned - turned[0]), atol=1e-6)
+    assert rate.sizes["loop_dof"] == 1
+
+
+def test_positions_that_are_given_are_held(write):
+    text = LOOP.replace('"revolute"', '"spherical"').replace("axis = [0, 1, 0]\n", "")
+    given = "[initial.position]\nshoulder = 0.2\n"
+    run = lw.run_scenario(write(text + given))
+    assert run.position.sel(joint="shoulder").values[0] == 0.2
+    free = lw.simulate(load(write(text)), duration=0.1, q0=[0.2, 0.0])
+    assert abs(free.position.sel(joint="shoulder").values[0] - 0.2) > 1e-6
+
+
+def test_positions_that_cannot_be_held_are_released_and_said(write):
+    given = "[initial.position]\nshoulder = 0.2\nelbow = 1.5\n"
+    try:
+        run = lw.run_scenario(write(LOOP + given))
+    except lw.InputError as error:
+        pytest.fail(str(error))
+    said = [note.text for note in run.warnings if note.element == "assembly"]
+    assert "joints that were to be held had to move" in said[0]
+    assert "by" in said[0]
 
 
 def test_the_command_calls_it_wrong_input(linkwise, write):
