@@ -223,11 +223,31 @@ def test_members_of_a_batch_are_single_runs():
 def test_peaks_of_drive_power_where_the_loop_is_cut():
     runs = simulate_both(FORCES["pd"], spin=1.0)
     for run, other in (runs, runs[::-1]):
-        peaks = lw.loads.peaks(run, model=None)
-        assert set(peaks.joint.values) == set("abcd")
         power = [lw.loads.quantities(r)["drive_power"].sel(joint="c").values for r in (run, other)]
         np.testing.assert_allclose(power[0], power[1], atol=1e-5)
         assert np.abs(power[0]).max() > 0.1
     found = [run["extreme_quantity"].sel(quantity="drive_power") for run in runs]
     for name in "cd":
-        np.testing.assert_allclose(*(x.sel(joint=name).values for x in found), atol=1e-4)
+        np.testing.assert_allclose(*(x.sel(joint=name).values for x in found), atol=2e-3)
+
+
+def test_shares_and_bounds_know_the_drives_where_the_loop_is_cut():
+    properties = {"c": {"armature": 0.3, "damping": 0.2}}
+    runs = simulate_both(FORCES["pd"], spin=1.0, properties=properties)
+    shares = [lw.loads.split(run) for run in runs]
+    for run, share in zip(runs, shares, strict=True):
+        total = share.sum("cause").values
+        np.testing.assert_allclose(total, run.joint_load.values, atol=1e-8 * np.abs(total).max())
+    for name in "abcd":  # of what is determined the shares are the same, wherever the loop is cut
+        first, second = (x.sel(joint=name).values[..., [0, 1, 5]] for x in shares)
+        np.testing.assert_allclose(second, first, atol=1e-5 * (1 + np.abs(first).max()))
+
+
+def test_what_does_not_take_given_motions_of_loop_joints_says_so():
+    motion = lw.Motion(lambda t: (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t)))
+    run = simulate_both({"c": motion})[0]
+    with pytest.raises(lw.InputError, match=r"joint 'c' closes a loop and its motion is given"):
+        lw.loads.split(run)
+    model = four_bar("c", c={"armature": 0.3})
+    with pytest.raises(lw.InputError, match=r"joint 'c' closes a loop and has an armature"):
+        lw.inverse_dynamics(model, np.zeros(3), None, np.zeros(3), driven=["a"])

@@ -25,6 +25,7 @@ from linkwise.loads.samples import (
     external,
     given_motions,
     joint_names,
+    loop_torque,
     model_of,
     need_whole,
     rows,
@@ -82,7 +83,7 @@ class Split:
             )
         wanted = ["joint_load", "position", "velocity"]
         wanted += ["drive_torque"] if by == "force" else ["acceleration"]
-        self.given = given_motions(run)
+        self.given = given_motions(run, machine)
         if by == "force" and self.given:
             wanted.append("acceleration")
         need_whole(run, machine, *wanted)
@@ -130,7 +131,8 @@ class Split:
         if self.by == "motion" or "motion" in self.names:
             a = rows(self.run, "acceleration", where)
         torque = rows(self.run, "drive_torque", where) if self.by == "force" else None
-        return self._of(q, v, a, torque, external(self.run, self.model, where))
+        loops = loop_torque(self.run, where)
+        return self._of(q, v, a, torque, external(self.run, self.model, where), loops)
 
     def shares_at_peaks(self, when: Array) -> Array:
         """(half, joint, cause, 6) of each joint at when (half, joint) its force and its moment were
@@ -171,13 +173,19 @@ class Split:
         return between
 
     def _of(
-        self, q: Array, v: Array, a: Array | None, torque: Array | None, outside: Array | None
+        self,
+        q: Array,
+        v: Array,
+        a: Array | None,
+        torque: Array | None,
+        outside: Array | None,
+        loops: Array | None = None,
     ) -> Array:
         if self.by == "force":
             assert torque is not None
             driven = np.where(self.imposed, 0.0, torque)
             held = a if "motion" in self.names else None
-            return self._by_force(q, [v, driven, outside, held])
+            return self._by_force(q, [v, driven, outside, held, loops])
         shares = np.empty((len(q), len(self.names), self.model.n_joints, 6))
         for k, cause in enumerate(self.names):
             shares[:, k] = _core.inverse_dynamics_loads(
@@ -192,10 +200,17 @@ class Split:
 
     def _by_force(self, q: Array, acting: Sequence[Array | None]) -> Array:
         """Of closed loops NaN at each state that is in a singular position."""
-        v, driven, outside, held = acting
+        v, driven, outside, held, loops = acting
         try:
             return _core.joint_loads_by_cause(
-                self.free, self.names, q, v, driven, external=outside, prescribed=held
+                self.free,
+                self.names,
+                q,
+                v,
+                driven,
+                external=outside,
+                prescribed=held,
+                loop_tau=loops,
             )
         except NumericsError:
             if not self.closed:

@@ -29,6 +29,7 @@ from linkwise.loads.samples import (
     external,
     given_motions,
     joint_names,
+    loop_torque,
     model_of,
     need_whole,
     rows,
@@ -71,11 +72,14 @@ def refined_loads(run: RunLike, model: Model, where: slice) -> Array:
     q, v = rows(run, "position", where), rows(run, "velocity", where)
     a = rows(run, "acceleration", where)
     outside = external(run, model, where)
-    given = list(given_motions(run))
+    given = list(given_motions(run, model))
     free = model.prescribe(given) if given else model
     if model.n_loops or model.coupling_names:
         return _solved_again(
-            free, q, v, a if given else None, rows(run, "drive_torque", where), outside
+            free,
+            (q, v, a if given else None),
+            (rows(run, "drive_torque", where), loop_torque(run, where)),
+            outside,
         )
     torque = rows(run, "drive_torque", where) + _core.passive_torque(model, q, v)
     residual = torque - _core.inverse_dynamics(model, q, v, a, external=outside)
@@ -87,11 +91,24 @@ def refined_loads(run: RunLike, model: Model, where: slice) -> Array:
 
 
 def _solved_again(
-    free: Model, q: Array, v: Array, a: Array | None, torque: Array, outside: Array | None
+    free: Model,
+    motion: tuple[Array, Array, Array | None],
+    torques: tuple[Array, Array | None],
+    outside: Array | None,
 ) -> Array:
     """Loads of closed loops, of the recorded states: nothing iterates in their elimination."""
+    q, v, a = motion
+    tau, loop_tau = torques
     solved = _core.forward_dynamics(
-        free, q, v, torque, external=outside, passive=True, full=True, prescribed=a
+        free,
+        q,
+        v,
+        tau,
+        external=outside,
+        passive=True,
+        full=True,
+        prescribed=a,
+        loop_tau=loop_tau,
     )
     if solved.report.outcome != "converged":  # in a singular position: not known
         return np.full(solved.joint_load.shape, np.nan)
@@ -130,7 +147,7 @@ def _undetermined(run: RunLike, model: Model, names: list[str]) -> AnyArray:
         return found
     if sum(6 - freedom for freedom in model.loop_nv) + len(model.coupling_names) > MOST_ROWS:
         return ~found
-    given = list(given_motions(run))
+    given = list(given_motions(run, model))
     held = model.prescribe(given) if given else model
     middle = run.dataset.sizes["time"] // 2
     masks = [

@@ -216,7 +216,6 @@ class ArgumentBuilder:
         result: dict[str, drives.Drive] = {}
         for joint, section in self.source.settings.drive.items():
             keys = ("drive", joint)
-            self._check_joint(joint, keys)
             result[joint] = self._drive(joint, section, keys)
         return result
 

@@ -71,10 +71,27 @@ def _of(*dimensions: str) -> BeforeValidator:
     return BeforeValidator(convert)
 
 
+def _factors(value: Any) -> float | list[float]:
+    """A number without a unit, or those of up to four powers."""
+    numbers = []
+    listed = value if isinstance(value, list) else [value]
+    if not 1 <= len(listed) <= 4:
+        raise ValueError(
+            f"has {len(listed)} numbers; give those of the coordinate and of its powers up to "
+            "the fourth"
+        )
+    for one in listed:
+        quantity = _quantity(one)
+        check_dimension(quantity.dimension, "number")
+        numbers.append(quantity.value)
+    return numbers if isinstance(value, list) else numbers[0]
+
+
 Scalar = Annotated[Quantity, PlainValidator(_quantity)]
 Vector = Annotated[Quantity | list[Quantity], PlainValidator(_quantities)]
 Limit = Annotated[Quantity | list[Quantity], PlainValidator(_limits)]
 Number = Annotated[float, _of("number")]
+Factors = Annotated[float | list[float], PlainValidator(_factors)]
 Time = Annotated[float, _of("time"), Field(gt=0)]
 Count = Annotated[int, Field(ge=1, lt=2**31)]
 Acceleration = Annotated[float, _of("acceleration")]
@@ -368,10 +385,7 @@ class CouplingSection(Section):
     """Coordinates tied together: the sum of factor times coordinate is offset, in SI units; a list
     of factors is that of a polynomial without a constant."""
 
-    factors: Annotated[
-        dict[str, Number | Annotated[list[Number], Field(min_length=1, max_length=4)]],
-        Field(min_length=1),
-    ]
+    factors: Annotated[dict[str, Factors], Field(min_length=1)]
     offset: Number = 0.0
 
 

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/dynamics/loop_groups.hpp"
 #include "linkwise/forces/armature_bias.hpp"
 
 namespace linkwise {
@@ -27,6 +28,11 @@ std::string number(double x) {
 
 DrivenInverse::DrivenInverse(const Model& model, std::span<const std::string> driven)
     : model_(model), tree_(model), mobility_(model) {
+  for (const LoopJoint& loop : model.loops.joints)
+    if (loop_rotors(model, loop) > 0)
+      throw InputError("joint '" + loop.joint.name + "'" + model.where() +
+                       " closes a loop and has an armature, which inverse dynamics does not take; "
+                       "let another joint close the loop");
   for (const std::string& name : driven) {
     for (const LoopJoint& loop : model.loops.joints)
       if (loop.joint.name == name)

@@ -93,7 +93,7 @@ void each_cause_alone(const Model& m, DynamicsMethod& method, size_t count,
                       const BatchInput& states, std::span<const Cause> asked, double* loads,
                       DynamicsReport& report, const GoOn& go_on) {
   BatchInput driven = states, passive = states;
-  passive.tau = nullptr;
+  passive.tau = passive.loop_tau = nullptr;
   passive.passive_acts = std::find(asked.begin(), asked.end(), Cause::passive) != asked.end();
   AppliedStates driven_states(m, count, driven), passive_states(m, count, passive);
   const size_t width = 6 * static_cast<size_t>(m.n_loads());
