@@ -34,8 +34,7 @@ void bind_causes(nb::module_& m) {
   m.def(
       "joint_loads_by_cause", &loads_by_cause, "model"_a, "causes"_a, "q"_a, "v"_a.none(),
       "tau"_a = nb::none(), nb::kw_only(), "external"_a = nb::none(), "prescribed"_a = nb::none(),
-      "loop_tau"_a = nb::none(),
-      "method"_a = "articulated_body", "threads"_a = nb::none(),
+      "loop_tau"_a = nb::none(), "method"_a = "articulated_body", "threads"_a = nb::none(),
       doc::text(
           R"(Joint loads that each cause alone makes; a joint load is linear in its causes.
 

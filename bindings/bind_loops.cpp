@@ -172,7 +172,8 @@ void bind_loop_coordinates(ModelClass& c) {
             return to_numpy(s.model->loops.dof[static_cast<int>(dof_property_from_name(name))]);
           },
           "name"_a,
-          "A property of the rates of all loop joints, by its name, such as \"lower\", \"upper\" "
+          "A property (n_loop_rates,) [its own unit] of all loop joints, by its name, such as "
+          "\"lower\", \"upper\" "
           "or "
           "\"damping\"; InputError if unknown.");
 }

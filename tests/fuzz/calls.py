@@ -71,7 +71,8 @@ CALLS = {
     "gravity:number threads",
     "joint_loads": "*q *v tau:v loop_tau:loop_rates external:wrenches passive:flag method solver "
     "threads",
-    "joint_loads_by_cause": "*causes *q *v tau:v loop_tau:loop_rates external:wrenches method threads",
+    "joint_loads_by_cause": "*causes *q *v tau:v loop_tau:loop_rates external:wrenches method "
+    "threads",
     "joint_poses": "*q threads",
     "link_poses": "*q threads",
     "loop_gaps": "*q",

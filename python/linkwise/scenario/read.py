@@ -113,7 +113,7 @@ class Scenario(ScenarioSource):
             "wrenches": builder.wrenches(),
             "q0": builder.state("position"),
             "v0": builder.state("velocity"),
-            "hold": list(self.settings.initial.position),
+            **({"hold": held} if (held := list(self.settings.initial.position)) else {}),
             "every": output.every,
             "record": {
                 "quantities": builder.quantities(),

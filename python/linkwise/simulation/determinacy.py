@@ -15,8 +15,6 @@ from linkwise.loads.certainty import MOST_ROWS
 from linkwise.notes import Ignored
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from linkwise._core import Model
 
 _FEW_ROWS = 100  # up to here a look takes a millisecond or less

@@ -366,6 +366,13 @@ def _require_memory(schema: Schema, samples: int) -> None:
     )
 
 
+def _start(model: Model, q0: npt.ArrayLike | None, v0: npt.ArrayLike | None) -> tuple[Array, Array]:
+    return (
+        state_vector("q0", q0, model.nq, model.initial_configuration()),
+        state_vector("v0", v0, model.nv, np.zeros(model.nv)),
+    )
+
+
 def simulate(
     model: Model,
     *,
@@ -432,10 +439,7 @@ def simulate(
     not determine (`run.determinate`), and an iterative solver whose errors are not bounded.
     """
     sampled = sample_times(duration, every, times)
-    start = (
-        state_vector("q0", q0, model.nq, model.initial_configuration()),
-        state_vector("v0", v0, model.nv, np.zeros(model.nv)),
-    )
+    start = _start(model, q0, v0)
     by_joint, by_name = check_driven(model, drives, wrenches)
     recording = Recording.of(record, options)
     chosen = options_object("numerics", Numerics, numerics, options)

@@ -15,7 +15,11 @@ LoopForces::LoopForces(const Setup& setup)
       given_v_(loops_.nv),
       given_du_(loops_.nv),
       tau_(loops_.nv),
-      drive_(loops_.nv) {}
+      drive_(loops_.nv) {
+  for (const Element& e : loops_.elements) turns_matter_ |= e.prescribed;
+  for (const Coupling& coupling : setup.model->couplings)
+    for (const Coupling::Term& term : coupling.terms) turns_matter_ |= term.closes;
+}
 
 void LoopForces::hold(const double* q) {
   LoopStates free(*setup_.model);
@@ -46,6 +50,7 @@ void LoopForces::update(double t, const double* q, const double* v) {
   in.q = q;
   in.v = v;
   give_to(in);
+  in.loop_q = near_q_.data();
   states_.update(in);
 }
 

@@ -17,8 +17,10 @@ class LoopForces {
   void hold(const double* q);
   /// Given motions at time t, for what takes states of the tree alone.
   void give(double t);
-  /// Coordinates of given motions and, of the other joints, where they were accepted last.
-  const double* near_q() const { return near_q_.data(); }
+  /// Coordinates of given motions and, of the other joints, where they were accepted last; null
+  /// where only what acts along the joints asks for turns, so that the equations of motion take
+  /// angles that are small.
+  const double* near_q() const { return turns_matter_ ? near_q_.data() : nullptr; }
   const double* given_v() const { return given_v_.data(); }
   /// Writes them into an input.
   void give_to(SweepInput<double>& in) const;
@@ -44,7 +46,7 @@ class LoopForces {
   const Setup& setup_;
   const LoopJoints& loops_;
   LoopStates states_;
-  bool passive_;
+  bool passive_, turns_matter_ = false;
   std::vector<double> near_q_, given_v_, given_du_, tau_, drive_;
 };
 

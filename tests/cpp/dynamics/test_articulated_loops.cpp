@@ -163,7 +163,8 @@ std::vector<double> beside_couplings(const LoopedMachine& machine, std::vector<d
   const size_t n = couplings.size();
   std::vector<std::vector<double>> pull(n, std::vector<double>(wanted.size()));
   for (size_t i = 0; i < n; ++i)
-    for (const Coupling::Term& term : couplings[i].terms) pull[i][term.v] += term.slope(machine.q[term.q]);
+    for (const Coupling::Term& term : couplings[i].terms)
+      pull[i][term.v] += term.slope(machine.q[term.q]);
   std::vector<double> A(n * n), b(n), s(n);
   for (size_t k = 0; k < wanted.size(); ++k) wanted[k] -= given[k];
   for (size_t i = 0; i < n; ++i)
@@ -235,7 +236,8 @@ void expect_motion(const LoopedMachine& machine, std::uint64_t seed, int want_ra
   for (int l = 0; l < model.n_loops(); ++l) {
     const LoopJoint& loop = model.loops.joints[l];
     const std::vector<double> driven =
-        loop.kind != LoopKind::joint ? loop_tau : beside_rotors(machine, kernel.states(), l, du, loop_tau);
+        loop.kind != LoopKind::joint ? loop_tau
+                                     : beside_rotors(machine, kernel.states(), l, du, loop_tau);
     const std::span<const Element> stack = stack_of(model, loop);
     const Vector6<double> w = to_array(transpose_times(
         loop.joint.to_user, to_force(&loads[6 * (static_cast<size_t>(model.n_joints()) + l)])));
@@ -344,7 +346,8 @@ TEST(ArticulatedLoops, CouplingsTieJointsAnywhere) {
       continue;  // a massless link at a tip
     }
     if (!machine->tree.undetermined().empty()) continue;
-    for (int c = 0; c < 1 + sample % 3; ++c) machine->couple(1 + draws.below(4), draws, sample % 2 == 0);
+    for (int c = 0; c < 1 + sample % 3; ++c)
+      machine->couple(1 + draws.below(4), draws, sample % 2 == 0);
     const int bodies = machine->tree.n_bodies();
     if (sample % 2) machine->close(spherical, draws.below(bodies - 1), bodies - 1, draws);
     expect_motion(*machine, sample, machine->make_consistent());

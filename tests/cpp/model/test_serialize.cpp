@@ -21,7 +21,7 @@ ModelSpec full_spec() {
   spec.links.push_back(random_link("tip", draws));
   spec.joints.push_back(random_joint(JointType::revolute, "j", "base", "tip", draws));
   spec.loop_joints = {{random_joint(JointType::universal, "loop", "link1", "tip", draws),
-                       random_rotation(draws), random_vector3(draws), 0}};
+                       random_rotation(draws), random_vector3(draws), LoopKind::rod, 0.7}};
   spec.couplings = {{"gear", {{"joint0", 2}, {"j", -1}}, 0.5}};
   spec.joints[0].dof = {{DofProperty::lower, {-infinity, -1, 0}}, {DofProperty::armature, {0.5}}};
   return spec;

@@ -23,7 +23,9 @@ std::shared_ptr<const Model> wheel(double damping = 0) {
   spec.joints.push_back(joint);
   joint.name = "bearing";
   joint.dof.push_back({DofProperty::damping, {damping}});
-  spec.loop_joints.push_back({joint});
+  LoopJointSpec loop;
+  loop.joint = joint;
+  spec.loop_joints.push_back(loop);
   return std::make_shared<const Model>(spec);
 }
 

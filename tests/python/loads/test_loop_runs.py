@@ -92,13 +92,13 @@ def test_a_stored_run_is_read_and_viewed(run, tmp_path):
     assert stored.load_model().loop_names == ["C1", "C2"]
     source = open_source(place, Options())
     assert source.recording is not None
-    assert source.recording.load(3).shape == (5, 6)
-    np.testing.assert_array_equal(source.recording.load(3), stored.joint_load.values[3, :5])
+    assert source.recording.load(3).shape == (7, 6)
+    np.testing.assert_array_equal(source.recording.load(3), stored.joint_load.values[3])
 
 
 def test_what_is_not_there_yet_says_so_in_one_line(run):
     with pytest.raises(lw.InputError, match="loop"):
-        lw.loads.split(run)
+        lw.loads.split(run, by="motion")
 
 
 def said_of_loads(run):
