@@ -8,7 +8,6 @@ planar. Both sides are timed from Python; a call of Pinocchio's costs a microsec
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import linkwise as lw
-from benchmarks import study
+from benchmarks import study, timing
 from benchmarks.machine import Array
 from linkwise.scenes import benchmark
 from linkwise.scenes.benchmark import Benchmark
@@ -161,10 +160,12 @@ class Pinocchio:
 
         def one() -> float:
             call, args = self.pin.constraintDynamics, (self.contacts, self.at, self.settings)
-            started = time.perf_counter()
-            for k in range(len(q)):
-                call(self.model, self.data, q[k], v[k], tau, *args)
-            return (time.perf_counter() - started) / len(q)
+
+            def all_states() -> None:
+                for k in range(len(q)):
+                    call(self.model, self.data, q[k], v[k], tau, *args)
+
+            return timing.timed(all_states)[1].seconds / len(q)
 
         return one
 
@@ -209,22 +210,22 @@ def of_row(n: int) -> dict[str, Any]:
 
 def our_motion(tolerance: float) -> dict[str, Any]:
     machine = benchmark("four_bars", n=40)
-    started = time.perf_counter()
-    run = lw.simulate(
-        machine.model,
-        q0=machine.q0,
-        v0=machine.v0,
-        times=[10.0],
-        record=["position"],
-        tolerance=tolerance,
-        threads=1,
+    run, taken = timing.timed(
+        lambda: lw.simulate(
+            machine.model,
+            q0=machine.q0,
+            v0=machine.v0,
+            times=[10.0],
+            record=["position"],
+            tolerance=tolerance,
+            threads=1,
+        )
     )
-    taken = time.perf_counter() - started
     pose = lw.joint_poses(machine.model, run.position.values[-1])[0]
     end = (pose @ np.array([0, 1, 0, 1]))[:2]
     error = float(np.linalg.norm(end - FORTY))
     setting = f"tolerance {tolerance:g}"
-    return {"engine": "linkwise", "setting": setting, "seconds": taken, "error": error}
+    return {"engine": "linkwise", "setting": setting, "seconds": taken.seconds, "error": error}
 
 
 def their_motion(step: float) -> dict[str, Any]:
@@ -251,12 +252,15 @@ def their_motion(step: float) -> dict[str, Any]:
     order = [machine.model.joint_names.index(n) for i in range(41) for n in _pair(i)]
     data.qpos[:] = np.asarray(machine.q0)[order]
     data.qvel[:] = np.asarray(machine.v0)[order]
-    started = time.perf_counter()
-    mujoco.mj_step(model, data, nstep=round(10 / step))
-    taken = time.perf_counter() - started
+    _, taken = timing.timed(lambda: mujoco.mj_step(model, data, nstep=round(10 / step)))
     angle = data.qpos[0]
     error = float(np.linalg.norm(np.array([-np.sin(angle), np.cos(angle)]) - FORTY))
-    return {"engine": "MuJoCo", "setting": f"step {step:g} s", "seconds": taken, "error": error}
+    return {
+        "engine": "MuJoCo",
+        "setting": f"step {step:g} s",
+        "seconds": taken.seconds,
+        "error": error,
+    }
 
 
 def _pair(i: int) -> list[str]:

@@ -71,6 +71,24 @@ def test_determinate_loads_do_not_depend_on_where_the_loop_is_cut():
         np.testing.assert_allclose(one, other, atol=1e-6 * np.abs(one).max())
 
 
+def test_joints_that_are_held_too_often_share_out_their_torques():
+    """A four-bar has one way to move: a second lock fights the first, in the plane, too."""
+    model = four_bar("c")
+    lock = {"a": lw.Locked()}
+    one = lw.simulate(model, duration=0.01, drives=lock)
+    np.testing.assert_array_equal(one.determinate, np.tile(PLANAR, (4, 1)))
+    for second in (lw.Locked(), lw.Motion(lambda t: (0.0, 0.0, 0.0))):
+        both = lw.simulate(model, duration=0.01, drives=lock | {"d": second}).determinate
+        assert not both.sel(joint=["a", "d"]).values.any()
+        # Hinges without a lock carry no torque, whoever fights.
+        assert both.sel(joint=["b", "c"], component="nz").values.all()
+        assert not both.sel(joint=["b", "c"], component=["fx", "fy"]).values.any()
+    many = lw.simulate_batch(
+        model, step=1e-3, duration=0.01, drives=lock | {"d": lw.Locked()}, q0=np.zeros((2, 3))
+    )
+    np.testing.assert_array_equal(many.determinate[1], both)
+
+
 def test_members_tell_it_each():
     model = door(2)
     found = lw.simulate_batch(model, step=1e-3, duration=0.01, v0=np.array([[0.0], [1.0]]))
@@ -131,7 +149,7 @@ def test_what_opens_in_some_poses_only_is_told():
     straight = {"A0": -np.pi / 2, "A1": -np.pi / 2, "B0": np.pi / 2}
     for name, angle in straight.items():
         flat[model.joint_names.index(name)] = angle
-    seen = Determinacy(model, machine.q0, samples=1)
+    seen = Determinacy(model, {}, machine.q0, samples=1)
     assert "in some poses only" not in seen.notes()[0].text
     before = seen.throughout.copy()
     assert lw.loop_gaps(model, flat).max() < 1e-12

@@ -161,6 +161,7 @@ def _add_determinate(
     schema: Schema,
     models: Sequence[Model],
     rows: Mapping[str, Array],
+    drives: Mapping[str, Drive],
 ) -> list[Ignored]:
     """Add which loads of each member rigid bodies determine; what is said of those that they do
     not. columns: positions (members, time, nq), and the states at peaks where they are kept."""
@@ -173,7 +174,7 @@ def _add_determinate(
     for member, path in enumerate(positions):
         model = models[member // each]
         start = _core.assemble(model, rows["q0"][member], rows["v0"][member], [])["q"]
-        seen = Determinacy(model, start, len(path))
+        seen = Determinacy(model, drives, start, len(path))
         seen.see(path)
         seen.see_peaks(None if states is None else states[member])
         known.append(seen.throughout)
@@ -288,7 +289,7 @@ def simulate_batch(
     )
     if schema.extremes:
         columns |= schema.extremes.split(flat)
-    notes += _add_determinate(columns, schema, models, rows)
+    notes += _add_determinate(columns, schema, models, rows, by_joint)
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
     if not interrupted:
         ignored = [*ignored, *_of_loops(models, rows, said, schema)]

@@ -3,7 +3,7 @@ the warning that says it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,11 +11,13 @@ import numpy as np
 from linkwise import _core
 from linkwise._core import InputError
 from linkwise.base import COMPONENTS, AnyArray
+from linkwise.drives import Locked, Motion
 from linkwise.loads.certainty import MOST_ROWS
 from linkwise.notes import Ignored
 
 if TYPE_CHECKING:
     from linkwise._core import Model
+    from linkwise.drives import Drive
 
 _FEW_ROWS = 100  # up to here a look takes a millisecond or less
 #: Poses of a run that are looked at besides its start: spread over the samples, and at peaks.
@@ -38,13 +40,24 @@ class Determinacy:
     """What was seen in the poses of one run.
 
     Args:
-        model: the machine; one that `is_looked_at`.
+        model: the machine; one that `is_looked_at`; drives: by joint.
         q: (nq,) [rad, m]: the start, which closes all loops.
         samples: how many positions `see` will be given.
     """
 
-    def __init__(self, model: Model, q: AnyArray, samples: int) -> None:
+    def __init__(
+        self, model: Model, drives: Mapping[str, Drive], q: AnyArray, samples: int
+    ) -> None:
         self._model = model
+        # Joints that are held still or moved as given hold a direction more. Those that close loops
+        # cannot be prescribed, and are looked at as if they were free.
+        of_tree = set(model.joint_names)
+        given = [
+            name
+            for name, drive in drives.items()
+            if isinstance(drive, (Locked, Motion)) and name in of_tree
+        ]
+        self._held = model.prescribe(given) if given else model
         small = _rows(model) <= _FEW_ROWS
         poses = min(samples, _POSES if small else 2)
         self._wanted = {round(k) for k in np.linspace(0, samples - 1, poses)}
@@ -65,7 +78,7 @@ class Determinacy:
         if not np.isfinite(q).all():
             return
         try:
-            found = _core.indeterminacy(self._model, q)
+            found = _core.indeterminacy(self._held, q)
         except InputError:  # of a run that went astray: its loops are open
             return
         self._count += 1

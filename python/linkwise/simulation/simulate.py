@@ -481,9 +481,8 @@ def simulate(
     )
     attrs |= _chosen(simulation, by_joint, by_name)
     notes += _of_loops(simulation, model, schema)
-    determinacy = (
-        Determinacy(model, simulation.start_position, sampled.size) if schema.determinate else None
-    )
+    looked = model, by_joint, simulation.start_position, sampled.size
+    determinacy = Determinacy(*looked) if schema.determinate else None
     ignored = [*notes, *_coarse_solver(simulation, options), *warnings_of(model)]
     attrs |= warning_attrs([*ignored, *_open(determinacy)])
     if output is None:
