@@ -167,6 +167,16 @@ def test_an_oscillation_and_its_energy():
     np.testing.assert_allclose(pulled, -42 * x - 0.8 * v, atol=1e-7)
 
 
+def test_runs_say_that_no_step_is_judged_by_springs():
+    start = {"q0": [0.3], "v0": [0.5]}
+    said = {
+        w["element"]: w["text"] for w in lw.simulate(balanced(), duration=0.1, **start).warnings
+    }
+    assert said["forces"].startswith("no error test watches those of springs")
+    batch = lw.simulate_batch(balanced(), step=1e-2, duration=0.1, **start)
+    assert "no error test watches" in batch.attrs["warnings"]
+
+
 def test_a_rope_only_pulls():
     """A spring with an upper stop alone: slack inside its length, tight beyond it."""
     builder = lw.ModelBuilder("rope", gravity=(0, 0, -10))

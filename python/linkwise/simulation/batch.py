@@ -296,6 +296,8 @@ def simulate_batch(
     early = sum(ending.outcome != "converged" for ending in endings)
     attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)
     noticed = _forces_in_doubt(*doubt, count)
+    if not noticed and simulations[0].force_doubt:  # before any step: what no step is judged by
+        noticed = [Ignored("", "forces", simulations[0].force_doubt)]
     attrs |= driven_attrs(by_joint, by_name) | warning_attrs([*noticed, *notes, *ignored])
     attrs |= {"outcome": "converged" if not early else f"{early} of {count} members ended early"}
     dataset = dataset.assign_attrs({name: plain(value) for name, value in attrs.items()})

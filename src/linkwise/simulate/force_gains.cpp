@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "linkwise/forces/coordinate_forces.hpp"
+#include "linkwise/forces/passive.hpp"
 
 namespace linkwise {
 namespace {
@@ -41,6 +42,14 @@ std::vector<GainRow> gain_rows(const Setup& setup) {
   for (const Element& e : setup.driven().elements)
     if (!e.prescribed) add_rows(setup, e, rows);
   return rows;
+}
+
+bool loops_have_gains(const Setup& setup) {
+  const Model& m = *setup.model;
+  bool pd = false;
+  for (size_t j = m.n_joints(); j < setup.drives.size(); ++j)
+    pd |= setup.drives[j].kind == DriveKind::pd;
+  return pd || has_passive_forces(m.loops);
 }
 
 Contact contact(const GainRow& row, double q, double v) {

@@ -22,6 +22,8 @@ struct GainRow {
 
 /// Every degree of freedom that has a gain and is not given.
 std::vector<GainRow> gain_rows(const Setup& setup);
+/// Whether what closes loops has a gain, of which gain_rows() has none.
+bool loops_have_gains(const Setup& setup);
 
 /// Of the nearer stop.
 struct Contact {

@@ -39,9 +39,13 @@ void Simulation::watch_step(double t, const double* y) {
 }
 
 std::string Simulation::force_doubt(size_t member) const {
-  if (accuracy_) return accuracy_->doubt();
-  if (fixed_forces_.empty()) return {};
-  return FixedStepForces::text(model(), fixed_forces_[member].worst());
+  std::string found;
+  if (accuracy_) found = accuracy_->doubt();
+  if (!fixed_forces_.empty()) found = FixedStepForces::text(model(), fixed_forces_[member].worst());
+  if (!found.empty() || !loops_have_gains(*setup_)) return found;
+  return "no error test watches those of springs, stops, dampers, friction and PD drives in what "
+         "closes loops, which err by their gain times the error of the motion; a run at a tighter "
+         "tolerance, or with shorter steps, shows by how much";
 }
 
 double Simulation::force_error(size_t member) const {
