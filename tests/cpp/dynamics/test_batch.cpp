@@ -30,7 +30,11 @@ struct Rows {
     }
   }
   BatchInput input() const {
-    return {q.data(), v.data(), tau.data(), du.data(), external.data(), 1};
+    return {.q = q.data(),
+            .v = v.data(),
+            .tau = tau.data(),
+            .du = du.data(),
+            .external = external.data()};
   }
 };
 
@@ -95,16 +99,25 @@ TEST_P(Batch, WhatIsAbsentIsZero) {
   const std::vector<double> zero(count * nv), no_wrench(count * 6 * model.n_joints());
   BatchEvaluator batch(model);
   std::vector<double> absent(count * nv), zeros(count * nv);
-  batch.forward_dynamics(count, {rows.q.data(), nullptr, rows.tau.data(), nullptr, nullptr, 0.5},
+  batch.forward_dynamics(count, {.q = rows.q.data(), .tau = rows.tau.data(), .gravity_factor = 0.5},
                          absent.data(), nullptr);
-  batch.forward_dynamics(
-      count, {rows.q.data(), zero.data(), rows.tau.data(), zero.data(), no_wrench.data(), 0.5},
-      zeros.data(), nullptr);
+  batch.forward_dynamics(count,
+                         {.q = rows.q.data(),
+                          .v = zero.data(),
+                          .tau = rows.tau.data(),
+                          .du = zero.data(),
+                          .external = no_wrench.data(),
+                          .gravity_factor = 0.5},
+                         zeros.data(), nullptr);
   expect_close(absent, zeros, 1e-14, "accelerations");
-  batch.inverse_dynamics(count, {rows.q.data(), nullptr, nullptr, nullptr, nullptr, 0.5},
-                         absent.data(), nullptr);
+  batch.inverse_dynamics(count, {.q = rows.q.data(), .gravity_factor = 0.5}, absent.data(),
+                         nullptr);
   batch.inverse_dynamics(count,
-                         {rows.q.data(), zero.data(), nullptr, zero.data(), no_wrench.data(), 0.5},
+                         {.q = rows.q.data(),
+                          .v = zero.data(),
+                          .du = zero.data(),
+                          .external = no_wrench.data(),
+                          .gravity_factor = 0.5},
                          zeros.data(), nullptr);
   expect_close(absent, zeros, 1e-14, "torques");
 }

@@ -36,7 +36,7 @@ TEST(Lifecycle, Methods) {
       options.method = entry.name;
       ASSERT_TRUE(make_dynamics(model, options)->evaluate(0, in, du.data(), loads.data()).ok());
     }
-    const BatchInput batch{in.q, in.v, in.tau, nullptr, nullptr, 1};
+    const BatchInput batch{.q = in.q, .v = in.v, .tau = in.tau};
     ASSERT_EQ(BatchEvaluator(model).forward_dynamics(1, batch, du.data(), nullptr), -1);
   }
 }

@@ -33,11 +33,6 @@ struct Rule {
 /// is stiff a race costs little beside what was saved.
 constexpr Rule to_bdf{.share = 0.2, .overhead = 0.02}, to_adams{.share = 0.7, .overhead = 0.05};
 
-/// Where a step is too long for the method's stability, its iterations diverge: on stiff motions in
-/// a third of the steps, on others in less than a hundredth. Then the first race comes early.
-constexpr long telling_failures = 20;
-constexpr double telling_share = 0.1, early = 0.25;
-
 /// After each race that was lost the next one is twice as far away, up to this.
 constexpr double most_patience = 8.0;
 
@@ -122,7 +117,6 @@ class Auto final : public Integrator {
   std::vector<double> state() const;
   void begin(bool bdf);
   void watch();
-  bool iterations_diverge(const IntegratorStatistics& now) const;
   Race race();
   void judge(const Race& race);
   void change_over();
@@ -134,9 +128,8 @@ class Auto final : public Integrator {
   IntegratorOptions options_[2];  ///< of adams and bdf
   std::unique_ptr<Integrator> active_;
   bool bdf_ = false, watches_ = true;
-  IntegratorStatistics earlier_;         ///< of methods that were at work before, and of races
-  double raced_at_ = 0.0;                ///< cost at the last race
-  long failures_at_ = 0, steps_at_ = 0;  ///< there, too
+  IntegratorStatistics earlier_;  ///< of methods that were at work before, and of races
+  double raced_at_ = 0.0;         ///< cost at the last race
   double patience_ = 1.0;
   Window window_;
   std::string stiffness_;
@@ -148,7 +141,6 @@ void Auto::begin(bool bdf) {
   bdf_ = bdf;
   active_ = make(bdf, system_);
   raced_at_ = 0.0;
-  failures_at_ = steps_at_ = 0;
   patience_ = 1.0;
   window_.times.clear();
 }
@@ -156,7 +148,6 @@ void Auto::begin(bool bdf) {
 void Auto::start(double t0, std::span<const double> y0) {
   if (bdf_) begin(false);
   raced_at_ = 0.0;
-  failures_at_ = steps_at_ = 0;
   patience_ = 1.0;
   window_.times.clear();
   earlier_ = {};
@@ -183,14 +174,9 @@ Outcome Auto::step(double t_limit) {
 
 /// Opens the window when a race comes near, and runs the race when it is due.
 void Auto::watch() {
-  const IntegratorStatistics now = active_->statistics();
-  const double cost = now.cost, spent = cost - raced_at_;
-  double window = window_cost(system_.size());
-  double interval = patience_ * window * rule().share / rule().overhead;
-  if (iterations_diverge(now)) {
-    window *= std::min(1.0, early * patience_);
-    interval = std::min(interval, patience_ * patience_ * early * window_cost(system_.size()));
-  }
+  const double cost = active_->statistics().cost, spent = cost - raced_at_;
+  const double window = window_cost(system_.size());
+  const double interval = patience_ * window * rule().share / rule().overhead;
   if (spent < interval - window) return;
   if (!window_.open()) {
     window_.state = state();
@@ -199,12 +185,6 @@ void Auto::watch() {
   }
   if (spent < interval) return;
   judge(race());
-}
-
-/// Since the last race.
-bool Auto::iterations_diverge(const IntegratorStatistics& now) const {
-  const long failures = now.nonlinear_failures - failures_at_, steps = now.steps - steps_at_;
-  return !bdf_ && failures >= telling_failures && failures >= telling_share * steps;
 }
 
 Auto::Race Auto::race() {
@@ -235,10 +215,7 @@ Auto::Race Auto::race() {
 
 void Auto::judge(const Race& race) {
   const double t = time();
-  const IntegratorStatistics now = active_->statistics();
-  raced_at_ = now.cost;
-  failures_at_ = now.nonlinear_failures;
-  steps_at_ = now.steps;
+  raced_at_ = active_->statistics().cost;
   window_.times.clear();
   patience_ = std::min(2.0 * patience_, most_patience);
   if (race.won && may_change_) {
