@@ -42,10 +42,16 @@ constexpr QuantityEntry table[] = {
      "position of joints that close loops", "", "",
      "zero where the two frames of the joint are one; angles are not wrapped; quaternions as in "
      "position",
-     [](const Instant& at, double* out) { copy(at.loops->q(), at.model.loops.nq, out); }, nullptr},
+     [](const Instant& at, double* out) {
+       if (at.loops) copy(at.loops->q(), at.model.loops.nq, out);
+     },
+     nullptr},
     {"loop_velocity", "velocity", loop_rates, Needs::state, true, "/s",
      "velocity of joints that close loops", "as velocity", "", "",
-     [](const Instant& at, double* out) { copy(at.loops->v(), at.model.loops.nv, out); }, nullptr},
+     [](const Instant& at, double* out) {
+       if (at.loops) copy(at.loops->v(), at.model.loops.nv, out);
+     },
+     nullptr},
     {"acceleration", "acceleration", rates, Needs::forces, true, "/s^2", "joint acceleration", "",
      "", "time derivative of velocity, component by component",
      [](const Instant& at, double* out) { copy(at.du, at.model.nv(), out); }, nullptr},
@@ -55,7 +61,9 @@ constexpr QuantityEntry table[] = {
     {"loop_drive_torque", "drive_torque", loop_rates, Needs::forces, true, "force",
      "drive torque or force of joints that close loops", "", "",
      "power into the mechanism is loop_drive_torque * loop_velocity",
-     [](const Instant& at, double* out) { copy(at.loops->drive(), at.model.loops.nv, out); },
+     [](const Instant& at, double* out) {
+       if (at.loops) copy(at.loops->drive(), at.model.loops.nv, out);
+     },
      nullptr},
     {"joint_load", "joint_load", joints, Needs::loads, true, "N, N m", "joint load",
      "joint frame, fixed in the outboard body", "joint point: the origin of the joint frame",
