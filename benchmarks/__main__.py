@@ -14,6 +14,7 @@ STUDIES = (
     "looped_robots",
     "huge_chains",
     "million_links",
+    "closed_loops",
     "iterations",
     "stop_tests",
     "stiff_machines",

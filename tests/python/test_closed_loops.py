@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 
 import linkwise as lw
@@ -225,3 +226,110 @@ def test_loads_of_loop_joints_stand_behind_the_others():
     assert list(run.joint_load.joint.values) == [*model.joint_names, *model.loop_names]
     alone = lw.joint_loads(model, run.position.values[3], run.velocity.values[3])
     assert np.abs(run.joint_load.values[3] - alone).max() < 1e-9
+
+
+def mooring(n: int, joint: str, span: float, length: float) -> lw.Model:
+    """A chain of n rods, 100 kg in all, between two anchors at one height."""
+    rod, mass = length / n, 100 / n
+    builder = lw.ModelBuilder("mooring", gravity=(0, 0, -9.81))
+    builder.add_link("ground")
+    axis = {"axis": (0, 1, 0)} if joint == "revolute" else {}
+    inertia = mass * rod**2 * np.diag([1e-3, 1 / 12, 1 / 12])
+    for k in range(n):
+        builder.add_link(f"rod_{k}", mass=mass, com=(rod / 2, 0, 0), inertia=inertia)
+        parent, at = (f"rod_{k - 1}", rod) if k else ("ground", 0.0)
+        builder.add_joint(f"J{k}", joint, parent, f"rod_{k}", translation=(at, 0, 0), **axis)
+    builder.add_loop(
+        "anchor",
+        joint,
+        f"rod_{n - 1}",
+        "ground",
+        translation=(rod, 0, 0),
+        child_translation=(span, 0, 0),
+        **axis,
+    )
+    return builder.build()
+
+
+@pytest.mark.parametrize("joint", ["revolute", "spherical"])
+@pytest.mark.parametrize("n", [10, 1000, 20000])
+def test_a_chain_between_two_anchors_hangs_as_a_catenary(n, joint):
+    """The horizontal pull is the same everywhere; a rod hangs along the mean pull on it."""
+    span, length, weight = 100.0, 120.0, 981.0
+    middle = (np.arange(n) + 0.5) / n - 0.5  # of the weight, from the lowest point on
+    pull = brentq(
+        lambda h: np.sum(length / n / np.sqrt(1 + (weight * middle / h) ** 2)) - span,
+        1.0,
+        1e5,
+        xtol=1e-12,
+        rtol=1e-15,
+    )
+    # A chain of ever shorter rods: span = 2 a asinh(length / 2 a), with a = H length / weight.
+    a = brentq(lambda a: 2 * a * np.arcsinh(length / (2 * a)) - span, 1.0, 1e4, xtol=1e-12)
+    assert pull == pytest.approx(a * weight / length, rel=0.3 / n**2 + 1e-12)
+    model = mooring(n, joint, span, length)
+    turns = np.diff(-np.arctan2(weight * middle, pull), prepend=0)
+    q = turns
+    if joint == "spherical":
+        q = np.zeros((n, 4))  # x, y, z, w
+        q[:, 1], q[:, 3] = np.sin(turns / 2), np.cos(turns / 2)
+        q = q.ravel()
+    loads = lw.joint_loads(model, q, np.zeros(model.nv))
+    tension = np.linalg.norm(loads[:, :3], axis=1)
+    # At joints; the last one is the loop's.
+    want = np.hypot(pull, weight * (np.arange(n + 1) / n - 0.5))
+    assert np.abs(tension / want - 1).max() < 1e-15 * n**1.5 + 1e-13
+
+
+def cross(r) -> np.ndarray:
+    return np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
+
+
+def test_a_net_accelerates_as_its_bodies_do_by_themselves():
+    """Newton and Euler of every body with the forces of all pins unknown, as one dense system."""
+    n, builder = 6, lw.ModelBuilder("net", gravity=(0, 0, -9.81))
+    builder.add_link("ground")
+    bodies, pins = {}, [("ground", "knot_0_0", np.zeros(3))]
+    slender = np.diag([1e-3, 1 / 12, 1 / 12])
+
+    def add(name: str, mass: float, at, com, inertia) -> None:
+        builder.add_link(name, mass=mass, com=com, inertia=inertia)
+        bodies[name] = np.asarray(at) + com, np.diag([mass] * 3), np.asarray(inertia)
+
+    for i, j in np.ndindex(n, n):
+        add(f"knot_{i}_{j}", 0.5, (j, i, 0), np.zeros(3), 0.01 * np.eye(3))
+    builder.add_joint("corner", "spherical", "ground", "knot_0_0")
+    for i, j, along in np.ndindex(n, n, 2):
+        k, m = (i, j + 1) if along == 0 else (i + 1, j)
+        if max(k, m) == n:
+            continue
+        name, point, at = f"rod_{i}_{j}_{along}", np.eye(3)[along], np.array([j, i, 0.0])
+        turned = slender if along == 0 else np.diag(np.diag(slender)[[1, 0, 2]])
+        add(name, 1.0, at, point / 2, turned)
+        builder.add_joint(f"start_{name}", "spherical", f"knot_{i}_{j}", name)
+        close = builder.add_loop if along == 0 and i > 0 else builder.add_joint
+        close(f"end_{name}", "spherical", name, f"knot_{k}_{m}", translation=point)
+        pins += [(f"knot_{i}_{j}", name, at), (name, f"knot_{k}_{m}", at + point)]
+    model = builder.build()
+    assert 3 * model.n_loops > 64  # rows: more than are factored densely
+    place = {name: 6 * k for k, name in enumerate(bodies)}
+    size = 6 * len(bodies)
+    yields, pull, rows = np.zeros((size, size)), np.zeros(size), np.zeros((3 * len(pins), size))
+    for name, (_, mass, inertia) in bodies.items():
+        o = place[name]
+        yields[o : o + 3, o : o + 3] = np.linalg.inv(mass)
+        yields[o + 3 : o + 6, o + 3 : o + 6] = np.linalg.inv(inertia)
+        pull[o + 2] = -9.81 * mass[0, 0]
+    for k, (parent, child, at) in enumerate(pins):
+        for name, sign in ((parent, 1), (child, -1)):
+            if name in place:
+                part = np.hstack([np.eye(3), -cross(at - bodies[name][0])])
+                rows[3 * k : 3 * k + 3, place[name] : place[name] + 6] = sign * part
+    unknown = np.linalg.solve(rows @ yields @ rows.T, rows @ yields @ pull)
+    turning = (yields @ (pull - rows.T @ unknown)).reshape(-1, 6)[:, 3:]
+    turning = dict(zip(bodies, turning, strict=True), ground=np.zeros(3))
+    pairs = zip(model.parent_link_names, model.child_link_names, strict=True)
+    want = np.concatenate([turning[child] - turning[parent] for parent, child in pairs])
+    found = lw.forward_dynamics(model, model.neutral_configuration(), np.zeros(model.nv))
+    assert np.abs(want).max() > 1
+    assert np.abs(found - want).max() < 1e-10 * np.abs(want).max()

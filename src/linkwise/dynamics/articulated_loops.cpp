@@ -249,10 +249,22 @@ void ArticulatedLoops::carry(const SweepInput<double>& in, int g) {
     const int count = static_cast<int>(carrier.rows.size());
     const std::span columns(w.columns.data() + carrier.first, static_cast<size_t>(count));
     const int dof = sweeps_.carry_loops(in, carrier.body, columns);
+    w.y.resize(static_cast<size_t>(dof) * count);
+    for (int k = 0; k < dof; ++k)
+      for (int j = 0; j < count; ++j) w.y[k * count + j] = columns[j].y[k];
+    const std::span rows(carrier.rows);
+    const bool in_a_row = count > 0 && rows.back() - rows.front() == count - 1;
     for (int i = 0; i < count; ++i) {
-      double* const row = system.row(carrier.rows[i]);
-      for (int j = 0; j <= i; ++j)
-        for (int k = 0; k < dof; ++k) row[carrier.rows[j]] += columns[i].z[k] * columns[j].y[k];
+      double* const row = system.row(rows[i]);
+      for (int k = 0; k < dof; ++k) {
+        const double z = columns[i].z[k], *const y = &w.y[k * count];
+        if (in_a_row) {
+          double* const own = row + rows.front();
+          for (int j = 0; j <= i; ++j) own[j] += z * y[j];
+        } else {
+          for (int j = 0; j <= i; ++j) row[rows[j]] += z * y[j];
+        }
+      }
       w.beta[carrier.rows[i]] += columns[i].beta;
       w.size[carrier.rows[i]] += std::abs(columns[i].beta);
       const int to = carrier.to[i];

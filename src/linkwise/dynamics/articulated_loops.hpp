@@ -54,6 +54,7 @@ class ArticulatedLoops {
     std::vector<LoopColumn<double>> columns;
     std::vector<Force<double>> Psi;             ///< [rows] on the top
     std::vector<double> beta, r, size, f, rhs;  ///< [rows]; size: of what makes up beta and r
+    std::vector<double> y;                      ///< [columns of the joint][rows] of a carrier
   };
 
   void carry(const SweepInput<double>& in, int g);

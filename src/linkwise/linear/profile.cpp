@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numeric>
 #include <utility>
 
 #include "linkwise/base/assert.hpp"
+#include "linkwise/linear/block.hpp"
+#include "linkwise/simd/lanes.hpp"
 
 namespace linkwise {
 namespace {
@@ -21,10 +24,40 @@ double largest(const std::vector<double>& x) {
   return size;
 }
 
+using Wide = Lanes<native_lanes>;
+
+LW_INLINE Wide load(const double* from) {
+  Wide x;
+  std::memcpy(&x, from, sizeof x);
+  return x;
+}
+
+/// In a sum per lane.
 double product_of(const double* a, const double* b, int begin, int end) {
+  Wide part = {};
+  int i = begin;
+  for (; i + native_lanes <= end; i += native_lanes) part += load(a + i) * load(b + i);
   double sum = 0;
-  for (int i = begin; i < end; ++i) sum += a[i] * b[i];
+  for (; i < end; ++i) sum += a[i] * b[i];
+  for (int k = 0; k < native_lanes; ++k) sum += part[k];
   return sum;
+}
+
+/// Of n rows with one other, which is read once.
+template <int n>
+void products_of(const double* const (&rows)[6], const double* other, int begin, int end,
+                 double* sums) {
+  Wide part[n] = {};
+  int l = begin;
+  for (; l + native_lanes <= end; l += native_lanes) {
+    const Wide x = load(other + l);
+    for (int i = 0; i < n; ++i) part[i] += load(rows[i] + l) * x;
+  }
+  for (int i = 0; i < n; ++i) {
+    sums[i] = 0;
+    for (int m = l; m < end; ++m) sums[i] += rows[i][m] * other[m];
+    for (int k = 0; k < native_lanes; ++k) sums[i] += part[i][k];
+  }
 }
 
 }  // namespace
@@ -54,7 +87,44 @@ void ProfileFactor::factor(const Profile& profile, std::span<const RowBlock> blo
   std::iota(order_.begin(), order_.end(), 0);
   pivot_.assign(profile.size(), 0.0);
   L_.resize(A.size());
-  for (const RowBlock& block : blocks) factor_block(profile, block, A, null);
+  // Rows of a panel meet each row before the panel while that is in the cache.
+  constexpr size_t panel = 8;
+  for (size_t at = 0; at < blocks.size(); at += panel) {
+    const auto own = blocks.subspan(at, std::min(panel, blocks.size() - at));
+    int begin = own[0].row;
+    for (const RowBlock& block : own) begin = std::min(begin, profile.first(block.row));
+    for (int j = begin; j < own[0].row; ++j)
+      for (const RowBlock& block : own)
+        if (profile.first(block.row) <= j) eliminate(profile, block, j, A);
+    for (const RowBlock& block : own) {
+      for (int j = std::max(profile.first(block.row), own[0].row); j < block.row; ++j)
+        eliminate(profile, block, j, A);
+      factor_block(profile, block, A, null);
+    }
+  }
+}
+
+/// Column j of the rows of a block.
+void ProfileFactor::eliminate(const Profile& profile, RowBlock block, int j,
+                              const std::vector<double>& A) {
+  const int begin = profile.first(block.row);
+  const double* const other = profile.row(L_.data(), j);
+  const double *given[6], *rows[6];
+  for (int i = 0; i < block.n; ++i) {
+    LINKWISE_ASSERT(profile.first(block.row + i) == begin, "rows of a block start in one column");
+    given[i] = profile.row(A.data(), block.row + i);
+    rows[i] = profile.row(L_.data(), block.row + i);
+  }
+  double sums[6] = {};
+  const bool taken = pivot_[j] > 0;
+  if (taken)
+    with_dim(block.n, [&](auto n) {
+      if constexpr (n.n > 0)
+        products_of<n.n>(rows, other, std::max(begin, profile.first(j)), j, sums);
+    });
+  for (int i = 0; i < block.n; ++i)
+    profile.row(L_.data(), block.row + i)[j] =
+        taken ? (given[i][order_[j]] - sums[i]) / other[j] : 0;
 }
 
 /// What the rows before leave of a block is factored by pivoting.
@@ -62,15 +132,8 @@ void ProfileFactor::factor_block(const Profile& profile, RowBlock block,
                                  const std::vector<double>& A, double null) {
   const int begin = profile.first(block.row), end = block.row + block.n;
   const auto row = [&](int i) { return profile.row(L_.data(), i); };
-  for (int i = block.row; i < end; ++i) {
-    LINKWISE_ASSERT(profile.first(i) == begin, "rows of a block start in one column");
-    const double* const given = profile.row(A.data(), i);
-    for (int j = begin; j < block.row; ++j) {
-      const double sum = product_of(row(i), row(j), std::max(begin, profile.first(j)), j);
-      row(i)[j] = pivot_[j] > 0 ? (given[order_[j]] - sum) / row(j)[j] : 0.0;
-    }
-    pivot_[i] = given[i] - product_of(row(i), row(i), begin, block.row);
-  }
+  for (int i = block.row; i < end; ++i)
+    pivot_[i] = profile.row(A.data(), i)[i] - product_of(row(i), row(i), begin, block.row);
   for (int k = block.row; k < end; ++k) {
     const int p = static_cast<int>(std::max_element(pivot_.begin() + k, pivot_.begin() + end) -
                                    pivot_.begin());
@@ -152,9 +215,8 @@ void ShiftedFactor::factor(const Profile& profile, const std::vector<double>& A)
     double pivot = row[i] + shift;
     for (int j = begin; j < i; ++j) {
       const double* other = profile.row(L_.data(), j);
-      double x = row[j];
-      for (int l = std::max(begin, profile.first(j)); l < j; ++l) x -= row[l] * other[l];
-      row[j] = x / other[j];
+      row[j] -= product_of(row, other, std::max(begin, profile.first(j)), j);
+      row[j] /= other[j];
       pivot -= row[j] * row[j];
     }
     pivot = std::max(pivot, 0.1 * shift);  // rounding may eat the shift
@@ -165,8 +227,7 @@ void ShiftedFactor::factor(const Profile& profile, const std::vector<double>& A)
 void ShiftedFactor::solve_once(const Profile& profile, double* x) const {
   for (int i = 0; i < profile.size(); ++i) {
     const double* row = profile.row(L_.data(), i);
-    for (int j = profile.first(i); j < i; ++j) x[i] -= row[j] * x[j];
-    x[i] /= row[i];
+    x[i] = (x[i] - product_of(row, x, profile.first(i), i)) / row[i];
   }
   for (int i = profile.size() - 1; i >= 0; --i) {
     const double* row = profile.row(L_.data(), i);

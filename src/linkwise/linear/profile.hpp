@@ -53,6 +53,7 @@ class ProfileFactor {
   double solve(const Profile& profile, const std::vector<double>& A, const double* b, double* x);
 
  private:
+  void eliminate(const Profile& profile, RowBlock block, int j, const std::vector<double>& A);
   void factor_block(const Profile& profile, RowBlock block, const std::vector<double>& A,
                     double null);
   void solve_once(const Profile& profile, const double* b, double* x);
