@@ -4,6 +4,7 @@ import contextlib
 import json
 import random
 import shutil
+import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -212,10 +213,15 @@ def _damage_folder(rng, place):
             (file.mkdir, lambda: file.symlink_to("/dev/zero"), lambda: file.symlink_to(place))
         )()
     else:
+        _copy_inside(file.parent, place / rng.choice(("extra", "a b", "c")), place.parent)
+
+
+def _copy_inside(folder, to, outside):
+    """Copies a folder, also into itself: by way of a folder outside, with its links as links."""
+    with tempfile.TemporaryDirectory(dir=outside) as between:
+        shutil.copytree(folder, between, symlinks=True, dirs_exist_ok=True)
         with contextlib.suppress(shutil.Error):  # a file stands where a folder of the copy would
-            shutil.copytree(
-                file.parent, place / rng.choice(("extra", "a b", "c")), dirs_exist_ok=True
-            )
+            shutil.copytree(between, to, symlinks=True, dirs_exist_ok=True)
 
 
 def _damage_json(rng, document):
