@@ -398,9 +398,10 @@ def simulate(
     Args:
         model: The mechanism.
         duration: Seconds to simulate; may be left out when `times` are given.
-        drives: Per joint name a drive (`Torque`, `PD`, `Locked`, `Free`), or what makes a `Torque`:
-            a number, one number per degree of freedom, or a callable `f(t, q, v)` of the joint's
-            own coordinates and velocities. Joints without a drive move freely.
+        drives: Per joint name, loop joints too, a drive (`Torque`, `PD`, `Spring`, `Motion`,
+            `Locked`, `Free`), or what makes a `Torque`: a number, one number per degree of freedom,
+            or a callable `f(t, q, v)` of the joint's own coordinates and velocities. Joints
+            without a drive move freely.
         wrenches: Per frame an external `Wrench`, or what makes one along the world's axes: six
             numbers, a `Table`, a function of time. A frame is the name of any link, merged ones
             too, or a `Frame`. A wrench that says itself where it acts (`at=`) may have any name.
