@@ -167,14 +167,41 @@ def test_an_oscillation_and_its_energy():
     np.testing.assert_allclose(pulled, -42 * x - 0.8 * v, atol=1e-7)
 
 
-def test_runs_say_that_no_step_is_judged_by_springs():
-    start = {"q0": [0.3], "v0": [0.5]}
-    said = {
-        w["element"]: w["text"] for w in lw.simulate(balanced(), duration=0.1, **start).warnings
-    }
-    assert said["forces"].startswith("no error test watches those of springs")
-    batch = lw.simulate_batch(balanced(), step=1e-2, duration=0.1, **start)
-    assert "no error test watches" in batch.attrs["warnings"]
+def hung(stiffness, damping=0.0):
+    """1 kg on a slide hangs on a spring that is slack where it starts."""
+    builder = lw.ModelBuilder("hung", gravity=(0, 0, -10))
+    builder.add_link("ground")
+    builder.add_link("mass", mass=1.0)
+    builder.add_joint("slide", "prismatic", "ground", "mass", axis=(0, 0, -1))
+    builder.add_spring(
+        "spring",
+        "ground",
+        "mass",
+        length=1.0,
+        point=(0, 0, 1),
+        stiffness=stiffness,
+        damping=damping,
+    )
+    return builder.build()
+
+
+@pytest.mark.parametrize(("tolerance", "allowed"), [(1e-4, 1.5), (1e-6, 0.05), (1e-8, 1e-3)])
+def test_forces_of_stiff_springs_are_known_at_any_tolerance(tolerance, allowed):
+    """x = g / w^2 (1 - cos w t): the force swings between 0 and 2 m g."""
+    omega = 1e4
+    run = lw.simulate(hung(omega**2), duration=2e-3, every=1e-5, tolerance=tolerance)
+    force = run.joint_load.sel(joint="spring", component="fz").values
+    want = 10 * (1 - np.cos(omega * run.time.values))
+    np.testing.assert_allclose(np.abs(force), want, atol=allowed)
+    assert not [w for w in run.warnings if w["element"] == "forces"]
+
+
+def test_fixed_steps_say_which_springs_they_do_not_resolve():
+    start = {"q0": [0.0], "v0": [0.0], "integrator": "semi_implicit_euler", "duration": 0.01}
+    coarse = lw.simulate_batch(hung(1e8, 100.0), step=1e-4, **start)
+    assert "the force of joint 'spring' may be wrong" in coarse.attrs["warnings"]
+    fine = lw.simulate_batch(hung(1e4, 1.0), step=1e-4, **start)
+    assert "the force of" not in str(fine.attrs.get("warnings"))
 
 
 def test_a_rope_only_pulls():

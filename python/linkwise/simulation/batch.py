@@ -119,11 +119,10 @@ def _dataset(
     )
 
 
-def _forces_in_doubt(members: int, worst: int, text: str, count: int, of_all: str) -> list[Ignored]:
-    """What is said of forces of large gain that the steps do not resolve, or that none watches:
-    `of_all`."""
+def _forces_in_doubt(members: int, worst: int, text: str, count: int) -> list[Ignored]:
+    """What is said of forces of large gain that the steps do not resolve."""
     if not members:
-        return [Ignored("", "forces", of_all)] if of_all else []
+        return []
     said = text if count == 1 else f"in {members} of {count} members; in member {worst} {text}"
     return [Ignored("", "forces", said)]
 
@@ -296,7 +295,7 @@ def simulate_batch(
         ignored = [*ignored, *_of_loops(models, rows, said, schema)]
     early = sum(ending.outcome != "converged" for ending in endings)
     attrs = provenance(first, options={**options, "members": count}, cpu_target=_core.cpu_target)
-    noticed = _forces_in_doubt(*doubt, count, simulations[0].force_doubt)
+    noticed = _forces_in_doubt(*doubt, count)
     attrs |= driven_attrs(by_joint, by_name) | warning_attrs([*noticed, *notes, *ignored])
     attrs |= {"outcome": "converged" if not early else f"{early} of {count} members ended early"}
     dataset = dataset.assign_attrs({name: plain(value) for name, value in attrs.items()})

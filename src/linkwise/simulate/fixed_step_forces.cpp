@@ -44,26 +44,29 @@ double deepest_between(const Contact& a, const Contact& b, double h) {
 
 }  // namespace
 
-FixedStepForces::FixedStepForces(const Setup& setup)
-    : setup_(setup), first_order_(find_integrator(setup.options.integrator).highest_order == 1) {
-  for (const GainRow& row : gain_rows(setup)) rows_.push_back({row});
+FixedStepForces::FixedStepForces(const Setup& setup, const std::vector<GainRow>& rows,
+                                 LoopWatch* loops)
+    : setup_(setup),
+      loops_(loops),
+      nq_(setup.model->nq() + (loops ? setup.model->loops.nq : 0)),
+      nv_(setup.model->nv() + (loops ? setup.model->loops.nv : 0)),
+      first_order_(find_integrator(setup.options.integrator).highest_order == 1) {
+  for (const GainRow& row : rows) rows_.push_back({row});
 }
 
 void FixedStepForces::start(double t, const double* q, const double* v) {
-  const Model& m = *setup_.model;
   for (Row& row : rows_) row.inertia = row.largest = row.error = row.time = 0;
   end_.t = t;
-  end_.q.assign(q, q + m.nq());
-  end_.v.assign(v, v + m.nv());
+  end_.q.assign(q, q + nq_);
+  end_.v.assign(v, v + nv_);
   end_.known = false;
   fresh_ = complete_ = true;
   breaks_ = false;
 }
 
 void FixedStepForces::evaluated(double t, const double* dv, const double* tau) {
-  const int nv = setup_.model->nv();
-  dv_.assign(dv, dv + nv);
-  tau_.assign(tau, tau + nv);
+  dv_.assign(dv, dv + nv_);
+  tau_.assign(tau, tau + nv_);
   evaluated_at_ = t;
   // What begins a step is of the right side of a break.
   if (fresh_ && same_time(t, end_.t)) {
@@ -76,10 +79,9 @@ void FixedStepForces::evaluated(double t, const double* dv, const double* tau) {
 
 void FixedStepForces::accepted(double t, const double* q, const double* v, bool breaks) {
   std::swap(begin_, end_);
-  const Model& m = *setup_.model;
   end_.t = t;
-  end_.q.assign(q, q + m.nq());
-  end_.v.assign(v, v + m.nv());
+  end_.q.assign(q, q + nq_);
+  end_.v.assign(v, v + nv_);
   end_.known = !fresh_ && same_time(evaluated_at_, t);
   complete_ = !begin_.known;
   breaks_ = breaks;
@@ -163,6 +165,7 @@ double FixedStepForces::of_blow(const Row& row, double speed, double h, double i
 
 /// 1 / (H^-1)_ii at the end of the step, or 0 where nothing moves.
 double FixedStepForces::inertia(const Row& row) {
+  if (row.closes) return loops_->inertia(row.v);
   if (mobilities_.empty()) {
     if (!mobility_) mobility_ = std::make_unique<Mobility>(setup_.driven());
     const auto found = mobility_->evaluate(end_.q.data());

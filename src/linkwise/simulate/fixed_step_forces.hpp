@@ -17,21 +17,22 @@
 
 #include "linkwise/dynamics/mobility.hpp"
 #include "linkwise/simulate/force_gains.hpp"
+#include "linkwise/simulate/loop_watch.hpp"
 
 namespace linkwise {
 
 /// Of one member.
 class FixedStepForces {
  public:
-  /// The setup must outlive this.
-  explicit FixedStepForces(const Setup& setup);
+  /// Both must outlive this. loops: null where no row closes one.
+  FixedStepForces(const Setup& setup, const std::vector<GainRow>& rows, LoopWatch* loops);
 
-  /// Whether anything turns errors into forces.
-  bool any() const { return !rows_.empty(); }
+  /// Whether nothing was evaluated since a step ended, or the start.
+  bool begins_step() const { return fresh_; }
 
-  /// q [nq], v [nv] in parent axes.
+  /// Coordinates, and rates in parent axes: those of LoopWatch where there is one.
   void start(double t, const double* q, const double* v);
-  /// After each evaluation: dv of v, and the joints' torques, [nv] each.
+  /// After each evaluation, or the first one of each step: dv of v, and the joints' torques.
   void evaluated(double t, const double* dv, const double* tau);
   /// At the end of each step; breaks: what acts jumps there.
   void accepted(double t, const double* q, const double* v, bool breaks);
@@ -61,6 +62,8 @@ class FixedStepForces {
   double inertia(const Row& row);
 
   const Setup& setup_;
+  LoopWatch* loops_;
+  int nq_, nv_;
   bool first_order_;
   std::unique_ptr<Mobility> mobility_;  ///< made when first needed
   std::vector<double> mobilities_;      ///< at the end of the step; empty: not computed

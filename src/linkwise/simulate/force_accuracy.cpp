@@ -37,11 +37,18 @@ double allowed_error(double usual, double gain, double force) {
 
 }  // namespace
 
-ForceAccuracy::ForceAccuracy(const Setup& setup) : setup_(setup) {
+ForceAccuracy::ForceAccuracy(const Setup& setup, std::vector<GainRow> rows, LoopWatch* loops)
+    : setup_(setup), loops_(loops), nq_(setup.model->nq()), nv_(setup.model->nv()) {
   const IntegratorOptions& o = setup.options.integration;
   relative_ = o.relative_tolerance > 0 ? o.relative_tolerance : o.tolerance;
   absolute_ = o.absolute_tolerance > 0 ? o.absolute_tolerance : o.tolerance;
-  for (const GainRow& row : gain_rows(setup)) rows_.push_back({row});
+  for (const GainRow& row : rows) {
+    rows_.push_back({row});
+    stops_close_ |= row.closes && row.stop > 0;
+  }
+  if (setup.driven().n_loops() == 0) return;
+  free_ = std::make_unique<FreeMotion>(setup.driven());
+  for (Row& row : rows_) row.held = true;
 }
 
 Contact ForceAccuracy::contact(const Row& row, const double* q, const double* v) const {
@@ -68,19 +75,52 @@ ForceAccuracy::Gains ForceAccuracy::gains(const Row& row, const double* q, const
 }
 
 void ForceAccuracy::limit_errors(const double* q, const double* v, double* allowed) const {
-  const int nq = setup_.model->nq();
   for (const Row& row : rows_) {
+    if (row.closes || row.held) continue;
     const Gains g = gains(row, q, v, true);
     const double force = std::max(row.largest, g.coming);
     const auto limit = [&](double& error, double gain) {
       error = allowed_error(error, gain, force);
     };
-    const double usual = allowed[nq + row.v];
+    const double usual = allowed[nq_ + row.v];
     if (row.q >= 0) limit(allowed[row.q], g.position);
-    double& rate = allowed[nq + row.v];
+    double& rate = allowed[nq_ + row.v];
     limit(rate, g.rate);
     rate = std::max(strictest * usual, std::min(rate, finest * g.bend));
   }
+  for (size_t i = 0; i < limits_.size(); ++i) allowed[i] = std::min(allowed[i], limits_[i]);
+}
+
+/// The error of a loop joint's coordinate or rate.
+double ForceAccuracy::error_of_slopes(const Row& row, bool of_rate,
+                                      const std::function<double(int)>& error) const {
+  double sum = 0;
+  for (const LoopWatch::Slope& slope : loops_->slopes(row.v)) {
+    const double part = (of_rate ? slope.rate : slope.position) * error(slope.of);
+    sum += part * part;
+  }
+  return std::sqrt(sum);
+}
+
+void ForceAccuracy::limit_slopes(const Row& row, const State& state) {
+  const Gains g = gains(row, state.q, state.v, true);
+  const double force = std::max(row.largest, g.coming);
+  const auto usual = [&](int i) { return usual_error(state, i); };
+  const auto limit = [&](bool of_rate, double gain, double bend) {
+    const double now = error_of_slopes(row, of_rate, usual);
+    const double wanted = std::min(allowed_error(now, gain, force), bend);
+    if (!(wanted < now)) return;
+    const auto slopes = loops_->slopes(row.v);
+    const double parts = std::sqrt(static_cast<double>(slopes.size()));
+    for (const LoopWatch::Slope& slope : slopes) {
+      const double z = of_rate ? slope.rate : slope.position;
+      if (!(z > 0)) continue;
+      const double least = strictest * usual(slope.of);
+      limits_[slope.of] = std::min(limits_[slope.of], std::max(least, wanted / (parts * z)));
+    }
+  };
+  limit(true, g.rate, finest * g.bend);
+  if (row.q >= 0) limit(false, g.position, infinity);
 }
 
 void ForceAccuracy::accepted(double t, const State& state) {
@@ -90,6 +130,7 @@ void ForceAccuracy::accepted(double t, const State& state) {
   mobilities_.clear();
   retakes_ = 0;
   has_jumped_ = false;
+  find_held(state);
   for (Row& row : rows_) {
     double force = 0;
     for (int i = row.group; i < row.group + row.width; ++i) force = std::hypot(force, state.tau[i]);
@@ -100,23 +141,48 @@ void ForceAccuracy::accepted(double t, const State& state) {
     }
     if (force > row.largest && std::isfinite(force)) row.largest = force;
     if (row.stop > 0) approach(row, t, state);
-    measure(row, t, state);
   }
+  if (loops_) limits_.assign(nq_ + nv_, infinity);
+  for (const Row& row : rows_)
+    if (row.closes && !row.held) limit_slopes(row, state);
+  for (Row& row : rows_)
+    if (!row.held) measure(row, t, state);
   steps_ = started_ ? steps_ + 1 : 0;
   started_ = true;
+}
+
+void ForceAccuracy::find_held(const State& state) {
+  if (!free_ || (started_ && steps_ < held_due_)) return;
+  held_due_ = started_ ? 2 * std::max(1, steps_) : 1;
+  const bool known = free_->evaluate(state.closed_q, state.loop_q);
+  bool any = false;
+  for (Row& row : rows_) {
+    if (!row.held) continue;
+    row.held = known && !(row.closes ? loops_->moves(row.v, *free_)
+                                     : std::abs(free_->moved()[row.v]) >
+                                           FreeMotion::held * free_->largest());
+    any |= row.held;
+  }
+  if (!any) free_.reset();
 }
 
 double ForceAccuracy::usual_error(const State& state, int i) const {
   return relative_ * state.scale[i] + absolute_;
 }
 
+double ForceAccuracy::usual_position_error(const Row& row, const State& state) const {
+  if (!row.closes) return usual_error(state, row.q);
+  return error_of_slopes(row, false, [&](int i) { return usual_error(state, i); });
+}
+
 /// 1 / (H^-1)_ii, or 0 where nothing moves.
 double ForceAccuracy::inertia(const Row& row, const double* q) {
+  if (row.closes) return loops_->inertia(row.v);
   if (mobilities_.empty()) {
     if (!mobility_) mobility_ = std::make_unique<Mobility>(setup_.driven());
     const auto found = mobility_->evaluate(q);
     mobilities_.assign(found.begin(), found.end());
-    mobilities_.resize(setup_.model->nv());
+    mobilities_.resize(nv_);
   }
   const double mobility = mobilities_[row.v];
   return mobility > 0 ? 1 / mobility : 0;
@@ -138,7 +204,7 @@ void ForceAccuracy::approach(Row& row, double t, const State& state) {
   const Contact at = contact(row, state.q, state.v);
   has_jumped_ |= row.near && pushes(row, at) != pushes(row, row.last);
   row.last = at;
-  row.usual_error = usual_error(state, row.q);
+  row.usual_error = usual_position_error(row, state);
   const bool was_near = std::exchange(row.near, false);
   double time = 0, speed = at.speed;
   if (at.depth < 0) {
@@ -159,8 +225,9 @@ void ForceAccuracy::approach(Row& row, double t, const State& state) {
 bool ForceAccuracy::passes_stop(double begin, double end, const double* q, const double* v,
                                 const std::function<void(double, double*)>& state) {
   if (begin != time_ || retakes_ >= most_retakes) return false;
-  const int nq = setup_.model->nq();
-  sampled_.resize(nq + setup_.model->nv());
+  const LoopJoints& loops = setup_.model->loops;
+  const int nq = nq_ + (loops_ ? loops.nq : 0);
+  sampled_.resize(nq + nv_ + (loops_ ? loops.nv : 0));
   double until = infinity;
   for (Row& row : rows_) {
     if (!(row.stop > 0) || row.last.depth >= 0) continue;
@@ -208,7 +275,6 @@ double ForceAccuracy::meets_stop(const Row& row, double begin, double end, const
 }
 
 void ForceAccuracy::measure(Row& row, double t, const State& state) const {
-  const int nq = setup_.model->nq();
   const Gains g = gains(row, state.q, state.v, false);
   const double force = std::max(row.largest, g.coming);
   double made = 0, of_rounding = 0;
@@ -217,10 +283,24 @@ void ForceAccuracy::measure(Row& row, double t, const State& state) const {
     made += gain * allowed_error(usual_error(state, i), gain, force);
     of_rounding += gain * rounding * std::abs(value);
   };
-  add(g.rate, nq + row.v, state.v[row.v]);
-  if (row.q >= 0) add(g.position, row.q, state.q[row.q]);
+  const auto add_slopes = [&](double gain, bool of_rate) {
+    if (!(gain > 0)) return;
+    made += gain * error_of_slopes(row, of_rate, [&](int i) {
+              return std::min(usual_error(state, i), limits_[i]);
+            });
+    of_rounding += gain * rounding * error_of_slopes(row, of_rate, [&](int i) {
+                     return std::abs(i < nq_ ? state.q[i] : state.v[i - nq_]);
+                   });
+  };
+  if (row.closes) {
+    add_slopes(g.rate, true);
+    add_slopes(g.position, false);
+  } else {
+    add(g.rate, nq_ + row.v, state.v[row.v]);
+    if (row.q >= 0) add(g.position, row.q, state.q[row.q]);
+  }
   // One component may have the whole of the error, which is a mean square.
-  const double components = std::sqrt(nq + setup_.model->nv());
+  const double components = std::sqrt(nq_ + nv_);
   made = components * std::max(made, of_rounding);
   if (made > row.error)
     row.error = made, row.error_of_rounding = components * of_rounding, row.error_time = t;
@@ -230,7 +310,8 @@ std::string ForceAccuracy::doubt() const {
   const Row* worst = nullptr;
   double ratio = doubtful;
   for (const Row& row : rows_)
-    if (row.error > ratio * row.largest && row.error > no_acceleration * row.at_start)
+    if (row.largest > 0 && row.error > ratio * row.largest &&
+        row.error > no_acceleration * row.at_start)
       ratio = row.error / row.largest, worst = &row;
   if (!worst) return {};
   const ForceDoubt found{worst, worst->error, worst->largest, worst->error_time};

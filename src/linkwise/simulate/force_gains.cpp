@@ -4,21 +4,28 @@
 #include <cstdio>
 
 #include "linkwise/forces/coordinate_forces.hpp"
-#include "linkwise/forces/passive.hpp"
+#include "linkwise/kinematics/loop_states.hpp"
 
 namespace linkwise {
 namespace {
 
-void add_rows(const Setup& setup, const Element& e, std::vector<GainRow>& rows) {
+/// joint: as a row of loads.
+void add_rows(const Setup& setup, const Element& e, int joint, std::vector<GainRow>& rows) {
   const Model& m = *setup.model;
-  const Drive& drive = setup.drives[e.joint];
+  const bool closes = joint >= m.n_joints();
+  const int before_q = closes ? m.nq() : 0, before_v = closes ? m.nv() : 0;
+  const Drive& drive = setup.drives[joint];
   const bool scalar = has_scalar_coordinates(e), pd = drive.kind == DriveKind::pd;
   const int turning = info_of(e.kind).turning;
   for (int k = 0; k < e.nv; ++k) {
     const int i = e.v + k;
-    const auto at = [&](DofProperty p) { return m.dof_values(p)[i]; };
-    GainRow row{.joint = e.joint, .q = scalar ? e.q + k : -1, .v = i, .group = i};
-    if (k < turning) row.group = e.v, row.width = turning;
+    const auto at = [&](DofProperty p) {
+      return closes ? m.loops.dof[static_cast<int>(p)][i] : m.dof_values(p)[i];
+    };
+    GainRow row{.joint = joint, .q = scalar ? before_q + e.q + k : -1, .v = before_v + i};
+    row.group = before_v + (k < turning ? e.v : i);
+    if (k < turning) row.width = turning;
+    row.closes = closes;
     if (k < turning || e.kind == ElementKind::prismatic) row.unit = "N";
     row.damping = at(DofProperty::damping) + (pd ? drive.kd : 0);
     row.friction = at(DofProperty::friction);
@@ -40,16 +47,12 @@ void add_rows(const Setup& setup, const Element& e, std::vector<GainRow>& rows) 
 std::vector<GainRow> gain_rows(const Setup& setup) {
   std::vector<GainRow> rows;
   for (const Element& e : setup.driven().elements)
-    if (!e.prescribed) add_rows(setup, e, rows);
+    if (!e.prescribed) add_rows(setup, e, e.joint, rows);
+  const Model& m = setup.driven();
+  for (int l = 0; l < m.n_loops(); ++l)
+    for (const Element& e : stack_of(m, m.loops.joints[l]))
+      if (!e.prescribed) add_rows(setup, e, m.n_joints() + l, rows);
   return rows;
-}
-
-bool loops_have_gains(const Setup& setup) {
-  const Model& m = *setup.model;
-  bool pd = false;
-  for (size_t j = m.n_joints(); j < setup.drives.size(); ++j)
-    pd |= setup.drives[j].kind == DriveKind::pd;
-  return pd || has_passive_forces(m.loops);
 }
 
 Contact contact(const GainRow& row, double q, double v) {
@@ -67,7 +70,8 @@ std::string ForceDoubt::text(const Model& model) const {
   std::snprintf(text, sizeof text,
                 "the force of joint '%.80s' may be wrong by %.2g %s, where the largest is %.2g %s, "
                 "at t = %.4g s: ",
-                model.joints[row->joint].name.c_str(), error, row->unit, largest, row->unit, time);
+                model.joint_at(row->joint).name.c_str(), error, row->unit, largest, row->unit,
+                time);
   return text;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 // What turns errors of coordinates and rates into forces: springs, PD drives, dampers, friction and
-// stops, a row per degree of freedom.
+// stops, a row per degree of freedom. Those of what closes loops are counted behind the tree's.
 #include <limits>
 #include <string>
 #include <vector>
@@ -13,6 +13,7 @@ namespace linkwise {
 struct GainRow {
   int joint = 0, q = -1, v = 0;  ///< q: -1 where it is no angle or distance
   int group = 0, width = 1;      ///< first rate, and how many, whose torques are one vector
+  bool closes = false;           ///< the joint closes a loop: see LoopWatch
   double stiffness = 0, damping = 0, friction = 0, friction_velocity = 1;
   double stop = 0, stop_damping = 0;
   double lower = -std::numeric_limits<double>::infinity();
@@ -22,8 +23,6 @@ struct GainRow {
 
 /// Every degree of freedom that has a gain and is not given.
 std::vector<GainRow> gain_rows(const Setup& setup);
-/// Whether what closes loops has a gain, of which gain_rows() has none.
-bool loops_have_gains(const Setup& setup);
 
 /// Of the nearer stop.
 struct Contact {

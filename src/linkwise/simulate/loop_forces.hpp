@@ -35,6 +35,7 @@ class LoopForces {
   const double* drive() const { return drive_.data(); }  ///< the drives' share
   const double* q() const { return states_.q().data(); }
   const double* v() const { return states_.v().data(); }
+  const LoopStates& states() const { return states_; }
   /// The drive torques of joints of given motion, from loads [n_loads][6] of the machine.
   void add_holding_torques(const double* loads);
   /// Takes out of them what a coupling puts into a joint.

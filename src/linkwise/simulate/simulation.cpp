@@ -236,7 +236,7 @@ std::string Simulation::described(Outcome outcome, int body) const {
 Outcome Simulation::evaluate(double t, const double* y, double* ydot) {
   if (solver_tolerance_) solver_tolerance_->set(t);
   const Outcome outcome = evaluate_by(method_.get(), t, y, ydot);
-  if (outcome == Outcome::converged) watch_evaluation(t, ydot);
+  if (outcome == Outcome::converged) watch_evaluation(t, y, ydot);
   return outcome;
 }
 

@@ -133,7 +133,8 @@ class Simulation : private OdeSystem {
   void keep_acting(const double* ydot);
   void weigh_forces(double t, const double* y);
   void watch_start(double t, const double* y);
-  void watch_evaluation(double t, const double* ydot);
+  std::pair<const double*, const double*> watched(double t, const double* y, size_t member);
+  void watch_evaluation(double t, const double* y, const double* ydot);
   void watch_step(double t, const double* y);
   void close_loops(double t0, const std::vector<std::string>& hold);
   void begin_coasting();
@@ -184,6 +185,7 @@ class Simulation : private OdeSystem {
   size_t members_ = 1;
   std::optional<AppliedForces> forces_;
   std::optional<StepLimits> step_limits_;
+  std::unique_ptr<LoopWatch> loop_watch_;      ///< null: nothing that closes loops has a gain
   std::optional<ForceAccuracy> accuracy_;      ///< of one member, with an error test
   std::vector<FixedStepForces> fixed_forces_;  ///< of each member; none: steps are chosen
   /// Of one member; loads at output times are computed apart, to the fixed tolerance.
@@ -209,7 +211,7 @@ class Simulation : private OdeSystem {
   double extremes_until_ = 0, advanced_to_ = 0;
   bool sampled_ = false;  ///< since the start
   /// Rows per member: state, that of an evaluation, given accelerations, samples.
-  std::vector<double> acting_;  ///< of the last evaluation: derivatives of the rates, torques
+  std::vector<double> acting_;  ///< of the last evaluation: derivatives of y, torques
   std::vector<double> scale_;
   std::vector<double> y_, evaluated_, given_, du_, loads_, total_;
   std::vector<double> start_;  ///< positions there
