@@ -33,6 +33,12 @@ struct Rule {
 /// is stiff a race costs little beside what was saved.
 constexpr Rule to_bdf{.share = 0.2, .overhead = 0.02}, to_adams{.share = 0.7, .overhead = 0.05};
 
+/// Where a step is too long for the method's stability, its iterations diverge: on stiff motions in
+/// a third of the steps, on others in less than a hundredth. Then the first race comes early. More
+/// failures than steps are those of a method that finds no step at all.
+constexpr long telling_failures = 20;
+constexpr double telling_share = 0.1, telling_most = 1.0, early = 0.25;
+
 /// After each race that was lost the next one is twice as far away, up to this.
 constexpr double most_patience = 8.0;
 
@@ -43,8 +49,12 @@ double starting_cost(int n) {
   return 100.0 + 4.0 * n + 20.0 * sundials::factor_cost(n) + 80.0 * sundials::solution_cost(n);
 }
 
-/// Windows hold enough steps for the other method to get going within its share of them.
+/// Windows hold enough steps for the other method to get going within its share of them. Adams
+/// takes longer for that, because its order rises to 12: it gets a longer window and may take the
+/// whole cost of it, and its share counts in the second half. Where it has spent half and covered
+/// less than a third, it gives up.
 double window_cost(int n) { return starting_cost(n) / to_bdf.share; }
+constexpr double longer = 2.0, hopeless = 1.0 / 3.0;
 
 /// The system until a time that it has reached, evaluated aside.
 class Past final : public OdeSystem {
@@ -100,9 +110,15 @@ class Auto final : public Integrator {
  private:
   /// What was covered since a race came near.
   struct Window {
-    std::vector<double> state, times;
-    double cost = 0.0;  ///< at its begin
+    std::vector<double> state, times, costs;  ///< costs: until these times
     bool open() const { return !times.empty(); }
+    void close() { times.clear(), costs.clear(); }
+    void add(double time, double cost) { times.push_back(time), costs.push_back(cost); }
+    /// The first step that ends when this share of the cost is spent.
+    std::size_t after(double share) const {
+      const double cost = costs.front() + share * (costs.back() - costs.front());
+      return std::lower_bound(costs.begin(), costs.end(), cost) - costs.begin();
+    }
   };
   struct Race {
     bool won = false;
@@ -117,6 +133,7 @@ class Auto final : public Integrator {
   std::vector<double> state() const;
   void begin(bool bdf);
   void watch();
+  bool iterations_diverge(const IntegratorStatistics& now);
   Race race();
   void judge(const Race& race);
   void change_over();
@@ -128,8 +145,9 @@ class Auto final : public Integrator {
   IntegratorOptions options_[2];  ///< of adams and bdf
   std::unique_ptr<Integrator> active_;
   bool bdf_ = false, watches_ = true;
-  IntegratorStatistics earlier_;  ///< of methods that were at work before, and of races
-  double raced_at_ = 0.0;         ///< cost at the last race
+  IntegratorStatistics earlier_;         ///< of methods that were at work before, and of races
+  double raced_at_ = 0.0;                ///< cost at the last race
+  long failures_at_ = 0, steps_at_ = 0;  ///< there, too
   double patience_ = 1.0;
   Window window_;
   std::string stiffness_;
@@ -141,15 +159,17 @@ void Auto::begin(bool bdf) {
   bdf_ = bdf;
   active_ = make(bdf, system_);
   raced_at_ = 0.0;
+  failures_at_ = steps_at_ = 0;
   patience_ = 1.0;
-  window_.times.clear();
+  window_.close();
 }
 
 void Auto::start(double t0, std::span<const double> y0) {
   if (bdf_) begin(false);
   raced_at_ = 0.0;
+  failures_at_ = steps_at_ = 0;
   patience_ = 1.0;
-  window_.times.clear();
+  window_.close();
   earlier_ = {};
   stiffness_.clear();
   changes_ = 0;
@@ -168,28 +188,46 @@ Outcome Auto::step(double t_limit) {
   if (watches_) watch();
   const Outcome outcome = active_->step(t_limit);
   if (outcome == Outcome::step_too_small && may_change_ && !bdf_) return try_bdf(t_limit);
-  if (window_.open() && outcome == Outcome::converged) window_.times.push_back(time());
+  if (window_.open() && outcome == Outcome::converged)
+    window_.add(time(), active_->statistics().cost);
   return outcome;
 }
 
 /// Opens the window when a race comes near, and runs the race when it is due.
 void Auto::watch() {
-  const double cost = active_->statistics().cost, spent = cost - raced_at_;
-  const double window = window_cost(system_.size());
-  const double interval = patience_ * window * rule().share / rule().overhead;
+  const IntegratorStatistics now = active_->statistics();
+  const double cost = now.cost, spent = cost - raced_at_;
+  const double usual = window_cost(system_.size());
+  double window = bdf_ ? longer * usual : usual;
+  double interval = patience_ * usual * rule().share / rule().overhead;
+  if (iterations_diverge(now)) {
+    window *= std::min(1.0, early * patience_);
+    interval = std::min(interval, patience_ * patience_ * early * usual);
+  }
   if (spent < interval - window) return;
   if (!window_.open()) {
     window_.state = state();
-    window_.times.assign(1, time());
-    window_.cost = cost;
+    window_.add(time(), cost);
   }
   if (spent < interval) return;
   judge(race());
 }
 
+/// Since the first failure after the last race.
+bool Auto::iterations_diverge(const IntegratorStatistics& now) {
+  const long failures = now.nonlinear_failures - failures_at_;
+  if (failures == 0) steps_at_ = now.steps;
+  const auto steps = static_cast<double>(now.steps - steps_at_);
+  return !bdf_ && failures >= telling_failures && failures >= telling_share * steps &&
+         failures <= telling_most * steps;
+}
+
 Auto::Race Auto::race() {
-  const double begin = window_.times.front(), end = time();
-  const double cost = active_->statistics().cost - window_.cost, allowed = rule().share * cost;
+  const std::vector<double>&times = window_.times, &costs = window_.costs;
+  const double begin = times.front(), end = time();
+  const std::size_t judged = bdf_ ? window_.after(0.5) : 0;
+  const double whole = costs.back() - costs.front(), cost = costs.back() - costs[judged];
+  const double allowed = bdf_ ? whole : rule().share * whole;
   Race result;
   // Below this, times cannot be told apart within the window.
   constexpr double rounding = 100.0 * std::numeric_limits<double>::epsilon();
@@ -198,15 +236,19 @@ Auto::Race Auto::race() {
   const auto other = make(!bdf_, past);
   other->start(begin, window_.state);
   IntegratorStatistics taken;
+  double before = 0.0;
   while (other->time() < end && taken.cost < allowed) {
+    const bool begun = other->time() >= times[judged];
     const Outcome outcome = other->step(end);
     taken = other->statistics();
+    if (!begun) before = taken.cost;
     if (outcome != Outcome::converged) break;
+    if (bdf_ && taken.cost > whole / 2 && other->time() < begin + hopeless * (end - begin)) break;
   }
   earlier_.evaluations += taken.evaluations;
-  result.won = other->time() >= end && taken.cost < allowed;
-  result.times_cheaper = cost / std::max(1.0, taken.cost);
-  const std::vector<double>& times = window_.times;
+  const double own = taken.cost - before;
+  result.won = other->time() >= end && own < rule().share * cost;
+  result.times_cheaper = cost / std::max(1.0, own);
   const auto steps = std::upper_bound(times.begin(), times.end(), other->time()) - times.begin();
   result.times_fewer_steps =
       static_cast<double>(steps - 1) / static_cast<double>(std::max(1L, taken.steps));
@@ -215,8 +257,11 @@ Auto::Race Auto::race() {
 
 void Auto::judge(const Race& race) {
   const double t = time();
-  raced_at_ = active_->statistics().cost;
-  window_.times.clear();
+  const IntegratorStatistics now = active_->statistics();
+  raced_at_ = now.cost;
+  failures_at_ = now.nonlinear_failures;
+  steps_at_ = now.steps;
+  window_.close();
   patience_ = std::min(2.0 * patience_, most_patience);
   if (race.won && may_change_) {
     if (changes_ == 0)
