@@ -44,6 +44,28 @@ def build(
         raise _with_line(error, path, found, first) from None
 
 
+def refuse_mimic_cycle(leaders: Mapping[str, str], elements: Mapping[str, UrdfElement]) -> None:
+    """InputError where joints mimic each other in a ring: that holds them, and no file means it.
+
+    leaders: of each joint that mimics, the joint that it follows; elements: where each says so.
+    """
+    done: set[str] = set()
+    for joint in leaders:
+        followed: dict[str, None] = {}  # in their order
+        at = joint
+        while at in leaders and at not in done and at not in followed:
+            followed[at] = None
+            at = leaders[at]
+        if at in followed:
+            names = list(followed)
+            ring = [shorten(name) for name in names[names.index(at) :]]
+            chain = " mimics ".join(f"'{name}'" for name in [*ring[:6], ring[0]])
+            elements[at].fail(
+                f"mimics itself by way of others: {chain}", "let one of them mimic none"
+            )
+        done |= followed.keys()
+
+
 def _with_line(
     error: InputError,
     path: str | os.PathLike[str],

@@ -21,7 +21,7 @@ from lxml import etree
 
 from linkwise._core import Model, ModelBuilder
 from linkwise.base import Array
-from linkwise.io.building import build
+from linkwise.io.building import build, refuse_mimic_cycle
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.sdf_frames import MODEL, WORLD, Frames, SdfElement, pose_of, quaternion_of
 from linkwise.io.urdf import MIMIC_REMEDY, MISSING_LEADER, Mimic
@@ -113,6 +113,8 @@ class _Reader:
         self._frames = Frames(path, model)
         self._joints: list[SdfElement] = []
         self._couplings: list[tuple[str, dict[str, float], float]] = []
+        self._leaders: dict[str, str] = {}
+        self._follower: dict[str, SdfElement] = {}
         for child in element.iterchildren(tag=etree.Element):
             tag = local_name(child)
             if tag in ("include", "model"):
@@ -248,6 +250,7 @@ class _Reader:
                 **placed,
             )
 
+        refuse_mimic_cycle(self._leaders, self._follower)
         for coupling, factors, offset in self._couplings:
             builder.add_coupling(coupling, factors, offset=offset)
 
@@ -262,6 +265,7 @@ class _Reader:
             default if mimic.get(key) is None else mimic.number(key, f"mimic {key}")
             for key, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
         )
+        self._leaders[name], self._follower[name] = leader, axis
         factors = {name: 1.0, leader: -multiplier}
         self._couplings.append((f"{name}_mimic", factors, offset - multiplier * reference))
 

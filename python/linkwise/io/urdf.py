@@ -17,7 +17,7 @@ from lxml import etree
 
 from linkwise._core import Model, ModelBuilder
 from linkwise.base import Array
-from linkwise.io.building import build
+from linkwise.io.building import build, refuse_mimic_cycle
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.urdf_elements import UrdfElement
 from linkwise.io.urdf_transmissions import Transmissions
@@ -272,6 +272,8 @@ class _Reader:
         """joint = multiplier times the other + offset, where mimic joints are coupled."""
         if self._mimic != "couple":
             return
+        leaders = {joint: target for joint, (target, *_) in self._mimics.items()}
+        refuse_mimic_cycle(leaders, {joint: self.found[f"joint '{joint}'"] for joint in leaders})
         for joint, (target, multiplier, offset) in self._mimics.items():
             builder.add_coupling(f"{joint}_mimic", {joint: 1, target: -multiplier}, offset=offset)
 

@@ -216,6 +216,15 @@ def test_mimic_as_a_coupling():
     assert model.hash == twin.hash
 
 
+def test_joints_that_mimic_each_other_are_refused():
+    text = PRESS
+    for joint, leader in (("drive", "knee"), ("knee", "drive")):
+        end = text.index("</axis>", text.index(f'<joint name="{joint}"'))
+        text = f'{text[:end]}<mimic joint="{leader}"/>{text[end:]}'
+    with pytest.raises(lw.InputError, match="mimics itself by way of others"):
+        lw.load(text)
+
+
 def test_what_is_ignored_is_counted_or_warned_of():
     with pytest.warns(lw.ModelWarning):
         model = lw.load(PRESS.replace("<plugin", "<damping>3</damping><plugin"))

@@ -187,6 +187,20 @@ def test_mimic_as_a_coupling(arm, complaint):
         assert said in message, message
 
 
+def test_joints_that_mimic_each_other_are_refused(arm, complaint):
+    """Two equations for two joints hold both, which no file means."""
+    text = arm.read_text()
+    for joint, leader in (("shoulder", "slide"), ("slide", "shoulder")):
+        start = text.index("<axis", text.index(f'<joint name="{joint}"'))
+        text = f'{text[:start]}<mimic joint="{leader}"/>{text[start:]}'
+    arm.write_text(text)
+    assert complaint(lw.load, arm).endswith(
+        ": joint 'shoulder': mimics itself by way of others: 'shoulder' mimics 'slide' mimics "
+        "'shoulder'; let one of them mimic none"
+    )
+    assert lw.load(arm, mimic="independent").nv == 2
+
+
 def test_unknown_options_are_refused(arm, complaint):
     assert "joint_order: unknown value 'name'" in complaint(lw.load, arm, joint_order="name")
     assert "mimic: unknown value 'x'" in complaint(lw.load, arm, mimic="x")
