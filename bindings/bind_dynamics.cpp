@@ -107,6 +107,7 @@ nb::list solver_list() {
     row("name", e.name);
     row("description", e.description);
     row("kind", to_string(e.kind));
+    row("takes_loops", e.takes_loops);
     row("parallel", e.parallel);
     row("reference", e.reference);
   });

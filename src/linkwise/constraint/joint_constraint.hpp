@@ -25,13 +25,18 @@ struct JointConstraint {
   Vector6<S> dual[6];    ///< P^+T: du_i = dual_i . (a_n - X a_p - c)
 };
 
-/// InputError naming the first body whose inertia is singular: it has no compliance.
+/// What is said of a body whose inertia is singular: it has no compliance.
+inline std::string singular_inertia(const Model& model, int body,
+                                    const char* method = "constraint_force") {
+  return "body '" + model.body_name(body) + "'" + model.where() +
+         " has a singular inertia, which method " + method +
+         " cannot take; give it mass and inertia about every axis, or use method articulated_body";
+}
+
+/// InputError naming the first such body.
 inline void require_regular_inertias(const Model& model, const char* method = "constraint_force") {
   if (const int body = model.singular_body(); body >= 0)
-    throw InputError(
-        "body '" + model.body_name(body) + "'" + model.where() +
-        " has a singular inertia, which method " + method +
-        " cannot take; give it mass and inertia about every axis, or use method articulated_body");
+    throw InputError(singular_inertia(model, body, method));
 }
 
 /// Columns of B of body n: what its joint constrains or drives through a rotor.

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/dynamics/loop_work.hpp"
 #include "linkwise/kinematics/coupling_states.hpp"
 
 namespace linkwise {
@@ -31,7 +32,10 @@ std::string rounded(double x) {
 class Closing {
  public:
   explicit Closing(const Model& model)
-      : model_(model), loops_(model), du_(model.nv()), step_(model.nv()) {}
+      : model_(model),
+        loops_(model, count_loop_work(model).prefers_graph()),
+        du_(model.nv()),
+        step_(model.nv()) {}
 
   /// Whether q could be assembled; otherwise it is the best that was found.
   bool close(std::vector<double>& q) {

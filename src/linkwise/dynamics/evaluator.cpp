@@ -276,8 +276,8 @@ Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const Dynami
     return picked;
   }
   choice = choose_dynamics(*model_, options);
-  if (count > 1 && !forces && choice.method == "constraint_force" && choice.solver == "thomas" &&
-      !ask_for_refinement(options.solver_options)) {
+  if (count > 1 && !forces && !model_->is_constrained() && choice.method == "constraint_force" &&
+      choice.solver == "thomas" && !ask_for_refinement(options.solver_options)) {
     require_regular_inertias(*model_);
     picked.on_lanes = BatchMethod::constraint_force;
   } else {
@@ -322,11 +322,9 @@ EvaluationReport Evaluator::forward_dynamics(size_t count, const BatchInput& sta
   check_prescribed(m, states);
   require_determined(m);
   check_room(m, count, states, out);
-  const bool plain = options.method == "auto" || options.method == "articulated_body";
-  if (count > 1 && m.is_constrained() && plain && options.solver == "auto" &&
-      !out.constraint_force) {
+  if (count > 1 && m.is_constrained() && !out.constraint_force) {
     check_states(m, count, states);
-    return evaluation_report(m, {"articulated_body", "", ""},
+    return evaluation_report(m, choose_dynamics(m, options),
                              over_threads(count, states, options, out, go_on));
   }
   AppliedStates applied(m, count, states);
@@ -370,7 +368,6 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
   const bool by_force = method == "constraint_force";
   require_known_bodies(m, find_dynamics(method));
   if (m.is_constrained()) {
-    if (by_force) refuse_loops(m, "method constraint_force", "use method articulated_body");
     DynamicsOptions options;
     options.method = method;
     DynamicsReport report;

@@ -1,5 +1,8 @@
 #include "linkwise/dynamics/forward_dynamics.hpp"
 
+#include <iomanip>
+#include <sstream>
+
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/articulated_body.hpp"
 #include "linkwise/dynamics/articulated_loops.hpp"
@@ -9,6 +12,8 @@
 #include "linkwise/dynamics/constraint_force.hpp"
 #include "linkwise/dynamics/global_projection.hpp"
 #include "linkwise/dynamics/joint_space_conjugate_gradient.hpp"
+#include "linkwise/dynamics/loop_work.hpp"
+#include "linkwise/dynamics/looped_constraint_force.hpp"
 #include "linkwise/dynamics/piecewise.hpp"
 #include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/solve/direct/direct_solver.hpp"
@@ -108,6 +113,7 @@ std::unique_ptr<DynamicsMethod> make_articulated_body(const Model& model,
 
 std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model,
                                                       const DynamicsOptions& options) {
+  if (model.is_constrained()) return std::make_unique<LoopedConstraintForce>(model, options);
   if (options.solver == "thomas" && !ask_for_refinement(options.solver_options))
     return std::make_unique<FusedConstraintForce>(model);
   return std::make_unique<ConstraintForce>(model, options);
@@ -118,7 +124,7 @@ constexpr DynamicsEntry table[] = {
     {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false,
      false, true, true, true, make_articulated_body},
     {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993",
-     true, false, false, true, false, make_constraint_force},
+     true, false, false, true, true, make_constraint_force},
     {"piecewise",
      "one long revolute chain in pieces: recursion inside, constraint forces between, on lanes and "
      "threads",
@@ -170,6 +176,31 @@ const DynamicsEntry& find_dynamics(std::string_view name) {
   throw InputError("method '" + std::string(name) + "' is unknown; known: " + known);
 }
 
+std::string rounded(double x) {
+  std::ostringstream text;
+  text << std::setprecision(2) << x;
+  return text.str();
+}
+
+void choose_for_loops(const Model& model, Choice& choice) {
+  const LoopWork work = count_loop_work(model);
+  choice.method = work.prefers_graph() ? "constraint_force" : "articulated_body";
+  if (work.prefers_graph())
+    choice.reason = "closed loops: the sparse factor of all joint constraint forces takes " +
+                    rounded(work.graph) + " multiplications, the recursion along the loops " +
+                    rounded(work.recursion);
+  else
+    choice.reason = "closed loops, of which the recursion carries the forces to where they meet";
+}
+
+/// A machine with closed loops is a graph.
+void require_solver_of_loops(const std::string& solver) {
+  if (!find_solver(solver).takes_loops)
+    throw InputError("solver '" + solver +
+                     "' takes trees, and this machine has closed loops or couplings; use solver "
+                     "thomas or conjugate_gradient");
+}
+
 /// On shorter chains the pieces are too short to pay for the cut system
 /// (benchmarks/cpp/crossovers.cpp).
 constexpr int piecewise_from = 64;
@@ -183,8 +214,7 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
       choice.method = "constraint_force";
       choice.reason = "a solver was asked for, and only constraint_force uses one";
     } else if (model.is_constrained()) {
-      choice.method = "articulated_body";
-      choice.reason = "only the recursion takes closed loops and couplings";
+      choose_for_loops(model, choice);
     } else if (model.n_bodies() >= piecewise_from && Piecewise::suits(model)) {
       choice.method = "piecewise";
       choice.reason = "a revolute chain of " + std::to_string(model.n_bodies()) +
@@ -207,6 +237,7 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
     choice.solver = "";
   else if (choice.solver == "auto")
     choice.solver = "thomas";
+  if (entry.uses_solver && model.is_constrained()) require_solver_of_loops(choice.solver);
   return choice;
 }
 

@@ -69,15 +69,6 @@ int top_of(const Model& model, const LoopGroup::Member& member) {
   return top;
 }
 
-std::vector<int> bodies_of(const Model& model, const LoopGroup::Member& member, int top) {
-  std::vector<int> bodies;
-  for (const int end : ends_of(model, member))
-    walk_inward(model, end, top, [&](int body) { bodies.push_back(body); });
-  std::sort(bodies.begin(), bodies.end());
-  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
-  return bodies;
-}
-
 void add_carriers(const Model& model, LoopGroup& group) {
   std::map<int, std::vector<int>, std::greater<>> rows;  // by body, tip to base
   for (const auto& member : group.members)
@@ -115,24 +106,16 @@ std::vector<LoopGroup::Member> all_members(const Model& model) {
 
 }  // namespace
 
-int loop_rotors(const Model& model, const LoopJoint& loop) {
-  const auto& armature = model.loops.dof[static_cast<int>(DofProperty::armature)];
-  int rotors = 0;
-  for (const Element& e : stack_of(model, loop))
-    for (int i = e.v; !e.prescribed && i < e.v + e.nv; ++i) rotors += armature[i] > 0;
-  return rotors;
+std::vector<int> bodies_of(const Model& model, const LoopGroup::Member& member, int top) {
+  std::vector<int> bodies;
+  for (const int end : ends_of(model, member))
+    walk_inward(model, end, top, [&](int body) { bodies.push_back(body); });
+  std::sort(bodies.begin(), bodies.end());
+  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
+  return bodies;
 }
 
-int loop_rows(const Model& model, const LoopJoint& loop) {
-  if (loop.kind == LoopKind::rod) return 1;
-  if (loop.kind == LoopKind::spring) return loop_rotors(model, loop);
-  int rows = 6;
-  for (const Element& e : stack_of(model, loop))
-    if (!e.prescribed) rows -= e.nv;
-  return rows + loop_rotors(model, loop);
-}
-
-std::vector<LoopGroup> make_loop_groups(const Model& model) {
+std::vector<LoopGroup> outline_loop_groups(const Model& model) {
   std::vector<LoopGroup::Member> members = all_members(model);
   Sets sets(static_cast<int>(members.size()));
   std::vector<int> first(model.n_bodies(), -1);  // member that passes a body
@@ -156,12 +139,15 @@ std::vector<LoopGroup> make_loop_groups(const Model& model) {
     group.members.push_back(std::move(members[i]));
   }
   std::vector<LoopGroup> groups;
-  for (auto& [set, group] : by_set) {
-    add_carriers(model, group);
-    groups.push_back(std::move(group));
-  }
+  for (auto& [set, group] : by_set) groups.push_back(std::move(group));
   std::stable_sort(groups.begin(), groups.end(),
                    [](const auto& a, const auto& b) { return a.top > b.top; });
+  return groups;
+}
+
+std::vector<LoopGroup> make_loop_groups(const Model& model) {
+  std::vector<LoopGroup> groups = outline_loop_groups(model);
+  for (LoopGroup& group : groups) add_carriers(model, group);
   return groups;
 }
 

@@ -32,12 +32,11 @@ struct LoopGroup {
   std::vector<Carrier> carriers;  ///< tip to base
 };
 
-/// Rows of a loop joint: directions that it holds, then its rotors.
-int loop_rows(const Model& model, const LoopJoint& loop);
-/// Coordinates of a loop joint that turn a rotor.
-int loop_rotors(const Model& model, const LoopJoint& loop);
-
+/// Bodies that carry the forces of a member inward to the top of its group, ascending.
+std::vector<int> bodies_of(const Model& model, const LoopGroup::Member& member, int top);
 /// Outermost tops first, the ground's group last.
 std::vector<LoopGroup> make_loop_groups(const Model& model);
+/// The same without columns and carriers.
+std::vector<LoopGroup> outline_loop_groups(const Model& model);
 
 }  // namespace linkwise

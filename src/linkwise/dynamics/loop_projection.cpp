@@ -36,19 +36,28 @@ void move_by(const Model& model, const double* du, double* q) {
   }
 }
 
-LoopProjection::LoopProjection(const Model& model)
+LoopProjection::LoopProjection(const Model& model, bool by_graph)
     : model_(model),
       states_(model),
-      kernel_(model),
       asked_(6 * static_cast<size_t>(model.n_loops()) + model.n_couplings()),
       weakest_(weak),
       faintest_(weak),
-      du_(model.nv()) {}
+      du_(model.nv()) {
+  if (by_graph)
+    graph_ = std::make_unique<LoopedConstraintForce>(model, DynamicsOptions{});
+  else
+    recursion_ = std::make_unique<ArticulatedLoops>(model);
+}
+
+bool LoopProjection::respond(const double* q, double least, double* du) {
+  return graph_ ? graph_->respond(q, asked_.data(), du)
+                : recursion_->respond(q, asked_.data(), least, du);
+}
 
 LoopReport LoopProjection::report_at(const double* q) {
   gap(q);
   close(q, null, du_.data());
-  return kernel_.report();
+  return report();
 }
 
 void LoopProjection::find_rank(const double* q) {
@@ -113,7 +122,7 @@ double LoopProjection::gap(const double* q) {
 }
 
 bool LoopProjection::close(const double* q, double least, double* du) {
-  return kernel_.respond(q, asked_.data(), least, du);
+  return respond(q, least, du);
 }
 
 double LoopProjection::slip(const double* q, const double* v) {
@@ -124,7 +133,7 @@ double LoopProjection::slip(const double* q, const double* v) {
 double LoopProjection::stop(const double* q, double least, double* v) {
   const double before = slip(q, v);
   if (before == 0) return before;
-  if (!kernel_.respond(q, asked_.data(), least, du_.data())) return NAN;
+  if (!respond(q, least, du_.data())) return NAN;
   for (size_t i = 0; i < du_.size(); ++i) v[i] += du_[i];
   return before;
 }

@@ -3,13 +3,15 @@
 // method with the least change in the metric of the mass matrix, then rates with the least change
 // of kinetic energy,
 //     q <- q (+) -H^-1 K^T (K H^-1 K^T)^+ g,     u <- u - H^-1 K^T (K H^-1 K^T)^+ (K u - k_t) .
-// Each is one response of the recursion at rest. What given motions ask for is in g and in the slip
+// Each is one response of the machine at rest. What given motions ask for is in g and in the slip
 // K u - k_t of the loop joints already, since these are taken with all rates.
 #include <algorithm>
+#include <memory>
 #include <vector>
 
 #include "linkwise/base/outcome.hpp"
 #include "linkwise/dynamics/articulated_loops.hpp"
+#include "linkwise/dynamics/looped_constraint_force.hpp"
 
 namespace linkwise {
 
@@ -20,8 +22,9 @@ struct LoopMotion {
 
 class LoopProjection {
  public:
-  /// The model must outlive it; prescribed joints stay where they are.
-  explicit LoopProjection(const Model& model);
+  /// The model must outlive it; prescribed joints stay where they are. by_graph: by the forces of
+  /// all joints at once, which holds weak directions like all others.
+  explicit LoopProjection(const Model& model, bool by_graph = false);
 
   /// From now on, what loop joints of given motion are to follow.
   void give(const LoopMotion& given) { given_ = given; }
@@ -48,18 +51,20 @@ class LoopProjection {
   double slip(const double* q, const double* v);
 
   const LoopStates& states() const { return states_; }
-  const LoopReport& report() const { return kernel_.report(); }
+  const LoopReport& report() const { return graph_ ? graph_->report() : recursion_->report(); }
 
  private:
   double miss(const double* q, const double* v);
   LoopReport report_at(const double* q);
+  bool respond(const double* q, double least, double* du);
 
   SweepInput<double> input(const double* q, const double* v) const;
 
   const Model& model_;
   LoopMotion given_;
   LoopStates states_;
-  ArticulatedLoops kernel_;
+  std::unique_ptr<ArticulatedLoops> recursion_;  ///< or
+  std::unique_ptr<LoopedConstraintForce> graph_;
   std::vector<double> asked_;
   int full_ = 0, at_start_ = 0;
   double weakest_;   ///< directions that hold less are left alone

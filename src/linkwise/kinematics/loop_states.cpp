@@ -49,6 +49,23 @@ std::string rounded(double x) {
 
 }  // namespace
 
+int loop_rotors(const Model& model, const LoopJoint& loop) {
+  const auto& armature = model.loops.dof[static_cast<int>(DofProperty::armature)];
+  int rotors = 0;
+  for (const Element& e : stack_of(model, loop))
+    for (int i = e.v; !e.prescribed && i < e.v + e.nv; ++i) rotors += armature[i] > 0;
+  return rotors;
+}
+
+int loop_rows(const Model& model, const LoopJoint& loop) {
+  if (loop.kind == LoopKind::rod) return 1;
+  if (loop.kind == LoopKind::spring) return loop_rotors(model, loop);
+  int rows = 6;
+  for (const Element& e : stack_of(model, loop))
+    if (!e.prescribed) rows -= e.nv;
+  return rows + loop_rotors(model, loop);
+}
+
 LoopPath loop_path(const Model& model, const LoopJoint& loop) {
   LoopPath path;
   int a = loop.parent_body, b = loop.joint.body;
@@ -210,6 +227,17 @@ LoopMiss miss_of(const LoopState& state, const double* residuals) {
   for (int i = 0; i < state.held; ++i)
     for (int k = 0; k < 6; ++k) held[k] += residuals[i] * state.basis.Q[i][k];
   return {size({held[0], held[1], held[2]}), size({held[3], held[4], held[5]})};
+}
+
+double widest_miss(const Model& model, const LoopStates& states, bool of_rates) {
+  double widest = 0;
+  for (int l = 0; l < model.n_loops(); ++l) {
+    const LoopState& loop = states[l];
+    const LoopMiss miss = miss_of(loop, of_rates ? loop.slip : loop.gap);
+    const double size = loop.length + (of_rates ? loop.speed : 0);
+    widest = std::max(widest, (miss.shift + miss.turn * loop.length) / size);
+  }
+  return widest;
 }
 
 void require_closed(const Model& model, const LoopStates& states, const std::string& where) {

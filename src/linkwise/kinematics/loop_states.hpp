@@ -31,6 +31,11 @@ inline std::span<const Element> stack_of(const Model& model, const LoopJoint& lo
           static_cast<size_t>(loop.joint.n_elements)};
 }
 
+/// Rows of a loop joint: directions that it holds, then its rotors.
+int loop_rows(const Model& model, const LoopJoint& loop);
+/// Coordinates of a loop joint that turn a rotor.
+int loop_rotors(const Model& model, const LoopJoint& loop);
+
 /// One loop joint. Everything is in F's axes, at F.
 struct LoopState {
   Transform<double> X_FA;  ///< body a's frame, or the ground's -> F
@@ -87,6 +92,9 @@ struct LoopMiss {
   double shift, turn;
 };
 LoopMiss miss_of(const LoopState& state, const double* residuals);
+
+/// The widest gap of all loops, or slip, over its loop's length, or speed.
+double widest_miss(const Model& model, const LoopStates& states, bool of_rates);
 
 /// InputError naming the first loop that a state leaves open, or opens, by more than a millionth of
 /// its length. `where`: begins the message.

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/dynamics/loop_work.hpp"
 #include "linkwise/simulate/given_motion.hpp"
 #include "linkwise/simulate/simulation.hpp"
 
@@ -14,7 +15,8 @@ void Simulation::close_loops(double t0, const std::vector<std::string>& hold) {
   assembled_.clear();
   const Model& m = setup_->driven();
   if (m.n_loops() + m.n_couplings() == 0) return;
-  loops_ = std::make_unique<LoopProjection>(m);
+  loops_ = std::make_unique<LoopProjection>(
+      m, setup_->choice.method == "constraint_force" && count_loop_work(m).prefers_graph());
   normalise_quaternions(m, y_.data());
   LoopMotion given;
   if (LoopForces* forces = forces_->loops()) {

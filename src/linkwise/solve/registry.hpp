@@ -21,6 +21,7 @@ struct SolverEntry {
   std::string_view description;
   SolverKind kind;
   bool chains_only;            ///< InputError on trees that branch
+  bool takes_loops;            ///< takes the graph of a machine with closed loops
   bool parallel;               ///< can all nodes work at once, up to sums and short recursions?
   std::string_view reference;  ///< key in references.bib
   std::unique_ptr<LinearSolver> (*make)(const SolverOptions&);

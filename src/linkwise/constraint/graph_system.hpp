@@ -1,0 +1,105 @@
+#pragma once
+// Assembles A f = b of a machine whose joints close loops, and reads motion and loads back from f.
+// A constraint i, be it a joint of the tree, a joint that closes a loop, a rod or a coupling, acts
+// on a few bodies k,
+//     sum_k G_ik a_k = r_i,      w_k += G_ik^T f_i,
+//     A_ij = sum_k G_ik M_k^-1 G_jk^T + compliance,   b_i = r_i - sum_k G_ik afree_k.
+// Of joint n of the tree, on parent p, G_n = B^T, G_p = -B^T X_n, r = B^T c_n + tau / armature
+// (joint_constraint.hpp); of a loop joint G and r are those of loop_states.hpp. A coupling has
+// G = p' P^+ of its joints, -p' P^+ X of their parents. What the ground's acceleration adds is in
+// r. Never solves.
+#include <string>
+#include <vector>
+
+#include "linkwise/constraint/joint_constraint.hpp"
+#include "linkwise/kinematics/loop_states.hpp"
+#include "linkwise/linear/block_graph.hpp"
+
+namespace linkwise {
+
+/// Nodes and hubs: joints of bodies, loop joints, couplings; bodies.
+BlockGraph make_constraint_graph(const Model& model);
+/// Why GraphSystem refuses a model, one line with its remedy, or "".
+std::string refusal_of_graph(const Model& model);
+
+class GraphSystem {
+ public:
+  /// InputError: refusal_of_graph().
+  explicit GraphSystem(const Model& model);
+
+  const BlockGraph& A() const { return A_; }
+  const std::vector<double>& b() const { return b_; }
+  /// Sums of the lengths of what makes up b.
+  const std::vector<double>& size() const { return size_; }
+  const LoopStates& loops() const { return loops_; }
+  /// Nodes of A: joints of bodies, loop joints, couplings. The body to name for one.
+  int body_of_node(int node) const;
+
+  /// asked: [n_loops][6], then [n_couplings], in place of what loops and couplings ask for; or
+  /// null.
+  void assemble(const SweepInput<double>& in, const double* asked = nullptr);
+  /// du [nv] from the solution f; loads [n_joints + n_loops][6] or null.
+  void recover(const SweepInput<double>& in, const std::vector<double>& f, double* du,
+               double* loads);
+  /// By what part of the largest acceleration those that recover() found miss the constraints.
+  double violation() const { return violation_; }
+
+  /// Refinement: b of what f and du miss. The joints of the tree hold exactly with accelerations
+  /// that follow from du; missed are torques, by Newton and Euler, and what loops and couplings
+  /// ask for.
+  void assemble_rest(const SweepInput<double>& in, const std::vector<double>& f, const double* du);
+  /// Adds the answer df of that system to f, du and loads.
+  void add_rest(const SweepInput<double>& in, const std::vector<double>& df, std::vector<double>& f,
+                double* du, double* loads);
+
+  /// What each coupling puts into each of its joints, coupling after coupling.
+  void coupling_loads(const std::vector<double>& f, std::vector<double>& loads) const;
+
+ private:
+  int node_of_loop(int l) const { return model_->n_bodies() + l; }
+  int node_of_coupling(int c) const { return model_->n_bodies() + model_->n_loops() + c; }
+  /// Row r of a node acts on a body, or on the ground, by a wrench.
+  void put(int node, int r, int body, const Force<double>& wrench);
+  void ask(int node, int r, double of_row);
+  void assemble_joint(int n, const double* tau);
+  void assemble_loop(int l, const double* asked);
+  void assemble_coupling(int c, const SweepInput<double>& in, const double* asked);
+  void place_term(int c, size_t t);
+  /// Torques [nv] act on the bodies, but for those of rotors.
+  void apply_torques(const double* tau);
+  void apply_loop_torques(const SweepInput<double>& in);
+  void finish_b();
+  /// tree_w_ and loop_w_ with what constraint forces add.
+  void add_forces(const std::vector<double>& f);
+  /// a_ of the known wrenches and constraint forces.
+  void calc_accelerations(const std::vector<double>& f);
+  /// Of joint n of the tree.
+  Vector6<double> relative_acceleration(int n) const;
+  void calc_violation();
+  double row_of_accelerations(int i, int r) const;
+  void calc_motion(const double* du);
+  void calc_torques_missed(const SweepInput<double>& in, const std::vector<double>& f,
+                           const double* du);
+  void store_loads(const double* q, double* loads) const;
+
+  const Model* model_;
+  BlockGraph A_;
+  std::vector<double> b_, r_, size_;
+  std::vector<Compliance<double>> compliance_;
+  std::vector<BodyState<double>> state_;
+  std::vector<GeneralState<double>> general_;
+  std::vector<JointConstraint<double>> joint_;
+  LoopStates loops_;
+  std::vector<std::vector<int>> columns_;    ///< by coupling and term: of its joint's P, or -1
+  std::vector<std::vector<double>> slopes_;  ///< the same: p' at the state
+  Motion<double> ground_;                    ///< acceleration of the ground
+  bool with_bias_ = true;                    ///< do velocities count?
+  std::vector<Force<double>> g_;             ///< known wrenches on bodies
+  std::vector<Force<double>> known_, known_of_loop_;  ///< what joints transmit of torques
+  std::vector<Force<double>> w_, loop_w_;             ///< what they transmit
+  std::vector<Motion<double>> a_;
+  std::vector<double> tau_;
+  double violation_ = 0;
+};
+
+}  // namespace linkwise

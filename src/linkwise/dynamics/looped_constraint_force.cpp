@@ -1,0 +1,112 @@
+#include "linkwise/dynamics/looped_constraint_force.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "linkwise/base/finite.hpp"
+#include "linkwise/recursion/tolerances.hpp"
+
+namespace linkwise {
+namespace {
+
+/// Pivots below this are zero, where D_A is 1: rounding errors leave 1e-16 of a zero.
+constexpr double null_pivot = 1e-10;
+/// A gap makes dependent constraints independent, by pivots of the order of its square.
+double null_for(double gap) { return std::clamp(100 * gap * gap, null_pivot, 1e-4); }
+
+}  // namespace
+
+LoopedConstraintForce::LoopedConstraintForce(const Model& model, const DynamicsOptions& options)
+    : model_(&model), system_(model), f_(system_.A().size()), df_(system_.A().size()) {
+  if (options.solver == "conjugate_gradient") {
+    SolverOptions own = options.solver_options;
+    own.executor = options.executor;
+    iteration_ = std::make_unique<GraphConjugateGradient>(own);
+  } else {
+    factor_ = std::make_unique<GraphFactor>(system_.A());
+  }
+  for (const LoopJoint& loop : model.loops.joints)
+    rows_ += loop_rows(model, loop) - loop_rotors(model, loop);
+  rows_ += model.n_couplings();
+}
+
+Report LoopedConstraintForce::solve(const std::vector<double>& b, std::vector<double>& x,
+                                    bool least) {
+  if (iteration_) {
+    const Report report = iteration_->solve(system_.A(), b, x);
+    missed_ = 0;
+    return report;
+  }
+  Report report;
+  report.error_estimate = std::numeric_limits<double>::quiet_NaN();
+  missed_ = factor_->solve(system_.A(), b, x, least);
+  if (!all_finite(x)) report.outcome = Outcome::not_finite;
+  return report;
+}
+
+/// What the factor says of the loops; by how much the constraints contradict each other.
+void LoopedConstraintForce::describe(double missed) {
+  loops_.rows = loops_.rank = loops_.strong = rows_;
+  if (!factor_) return;
+  loops_.rank = loops_.strong = rows_ - factor_->n_null();
+  loops_.smallest_pivot = factor_->smallest_pivot();
+  double asked = 0;
+  const BlockGraph& A = system_.A();
+  for (int i = 0; i < A.n(); ++i)
+    for (int r = 0; r < A.dim(i); ++r)
+      asked = std::max(asked, system_.size()[A.offset[i] + r] * factor_->scale(i, r));
+  loops_.contradiction = asked > 0 ? missed / asked : 0;
+}
+
+DynamicsReport LoopedConstraintForce::evaluate(double, const SweepInput<double>& in, double* du,
+                                               double* loads) {
+  const bool least = loads != nullptr;
+  system_.assemble(in);
+  loops_ = {};
+  const double gap = widest_miss(*model_, system_.loops(), false);
+  loops_.open = std::max(gap, widest_miss(*model_, system_.loops(), true));
+  DynamicsReport report;
+  if (factor_)
+    report.node =
+        factor_->factor(system_.A(), std::clamp(100 * gap * gap, null_pivot, 1e-4), least);
+  if (report.node >= 0)
+    report.outcome =
+        system_.A().all_finite() ? Outcome::not_positive_definite : Outcome::not_finite;
+  else
+    static_cast<Report&>(report) = solve(system_.b(), f_, least);
+  if (report.node >= 0) report.body = system_.body_of_node(report.node);
+  if (!report.ok()) return report;
+  describe(missed_);
+  report.loops = loops_;
+  if (loops_.is_contradictory()) report.outcome = Outcome::singular_position;
+  system_.recover(in, f_, du, loads);
+  if (factor_ && report.ok() && system_.violation() > acceptable_violation)
+    refine(in, du, loads, least);
+  if (loads) system_.coupling_loads(f_, coupling_load_);
+  return report;
+}
+
+void LoopedConstraintForce::refine(const SweepInput<double>& in, double* du, double* loads,
+                                   bool least) {
+  system_.assemble_rest(in, f_, du);
+  if (solve(system_.b(), df_, least).ok()) system_.add_rest(in, df_, f_, du, loads);
+}
+
+bool LoopedConstraintForce::respond(const double* q, const double* asked, double* du) {
+  at_rest_.assign(model_->nv(), 0.0);
+  SweepInput<double> in;
+  in.q = q;
+  in.tau = at_rest_.data();
+  in.gravity_factor = 0;
+  system_.assemble(in, asked);
+  loops_ = {};
+  const double gap = widest_miss(*model_, system_.loops(), false);
+  if (factor_ && factor_->factor(system_.A(), null_for(gap), false) >= 0) return false;
+  if (!solve(system_.b(), f_, false).ok()) return false;
+  describe(missed_);
+  system_.recover(in, f_, du, nullptr);
+  return true;
+}
+
+}  // namespace linkwise

@@ -1,0 +1,216 @@
+// Systems of graphs, against one dense matrix.
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "base/draws.hpp"
+#include "linkwise/linear/semidefinite.hpp"
+#include "linkwise/solve/direct/graph_factor.hpp"
+#include "linkwise/solve/iterative/graph_conjugate_gradient.hpp"
+
+namespace linkwise::testing {
+namespace {
+
+/// Nodes of 0 to 6 rows on one to three of some hubs. singular: every third node is one before it
+/// once more.
+BlockGraph random_graph(int nodes, int hubs, bool singular, Draws& draws) {
+  std::vector<int> dims;
+  std::vector<std::vector<int>> of_node;
+  for (int i = 0; i < nodes; ++i) {
+    dims.push_back(draws.below(7));
+    of_node.push_back({i % hubs});
+    for (int more = draws.below(3); more > 0; --more) {
+      const int k = draws.below(hubs);
+      if (std::find(of_node.back().begin(), of_node.back().end(), k) == of_node.back().end())
+        of_node.back().push_back(k);
+    }
+    if (singular && i % 3 == 2) {
+      dims[i] = dims[i - 2];
+      of_node[i] = of_node[i - 2];
+    }
+  }
+  BlockGraph A;
+  A.set_structure(dims, of_node);
+  for (double& x : A.levers) x = draws.normal();
+  for (Block& C : A.compliance) {
+    Block root;
+    for (double& x : root) x = draws.normal();
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j) {
+        C[6 * i + j] = i == j;
+        for (int k = 0; k < 6; ++k) C[6 * i + j] += root[6 * i + k] * root[6 * j + k];
+      }
+  }
+  for (int i = 0; i < nodes; ++i) {
+    for (int r = 0; r < dims[i] && !singular; ++r)
+      if (draws.below(2)) A.own[A.offset[i] + r] = draws.uniform(0.1, 1);
+    if (!singular || i % 3 != 2) continue;
+    for (size_t which = 0; which < of_node[i].size(); ++which)
+      for (int r = 0; r < dims[i]; ++r)
+        std::copy_n(A.lever(i - 2, static_cast<int>(which), r), 6,
+                    A.lever(i, static_cast<int>(which), r));
+  }
+  return A;
+}
+
+/// A, by its product; and L^-1 A L^-T with D_A = L L^T.
+struct Dense {
+  int n;
+  std::vector<double> A, scaled;
+  std::vector<double> L;  ///< [n][n]
+
+  explicit Dense(const BlockGraph& graph) : n(graph.size()) {
+    const auto size = static_cast<size_t>(n);
+    A.resize(size * size);
+    L.resize(size * size);
+    std::vector<double> unit(size), column(size), room;
+    for (int j = 0; j < n; ++j) {
+      unit[j] = 1;
+      graph.multiply(unit, column, room);
+      unit[j] = 0;
+      for (int i = 0; i < n; ++i) A[i * size + j] = column[i];
+    }
+    for (int node = 0; node < graph.n(); ++node)
+      for (int i = graph.offset[node]; i < graph.offset[node + 1]; ++i)
+        for (int j = graph.offset[node]; j <= i; ++j) {
+          double x = A[i * size + j];
+          for (int k = graph.offset[node]; k < j; ++k) x -= L[i * size + k] * L[j * size + k];
+          L[i * size + j] = i == j ? std::sqrt(x) : x / L[j * size + j];
+        }
+    scaled = A;
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) column[i] = scaled[i * size + j];
+      forward(column);
+      for (int i = 0; i < n; ++i) scaled[i * size + j] = column[i];
+    }
+    for (int i = 0; i < n; ++i) {
+      std::copy_n(&scaled[i * size], n, column.begin());
+      forward(column);
+      std::copy_n(column.begin(), n, &scaled[i * size]);
+    }
+  }
+  void forward(std::vector<double>& x) const {
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < i; ++j) x[i] -= L[static_cast<size_t>(i) * n + j] * x[j];
+      x[i] /= L[static_cast<size_t>(i) * n + i];
+    }
+  }
+  void backward(std::vector<double>& x) const {
+    for (int i = n; i-- > 0;) {
+      for (int j = i + 1; j < n; ++j) x[i] -= L[static_cast<size_t>(j) * n + i] * x[j];
+      x[i] /= L[static_cast<size_t>(i) * n + i];
+    }
+  }
+  /// Of all solutions the one of least x^T D_A x; the number of null vectors.
+  std::vector<double> least(std::vector<double> b, int& nulls) const {
+    SemidefiniteFactor factor;
+    factor.factor(n, scaled.data(), 1e-10);
+    nulls = n - factor.rank();
+    forward(b);
+    factor.solve(b.data(), b.data());
+    backward(b);
+    return b;
+  }
+};
+
+double largest(const std::vector<double>& x) {
+  double size = 0;
+  for (const double xi : x) size = std::max(size, std::abs(xi));
+  return size;
+}
+
+TEST(GraphFactor, SolvesAsOneDenseMatrix) {
+  for (int sample = 0; sample < 40; ++sample) {
+    SCOPED_TRACE(sample);
+    Draws draws(sample);
+    const bool singular = sample % 2;
+    const int nodes = 1 + draws.below(40);
+    const BlockGraph A = random_graph(nodes, 1 + draws.below(nodes), singular, draws);
+    const Dense dense(A);
+    std::vector<double> any(A.size()), b(A.size()), x(A.size()), room;
+    for (double& xi : any) xi = draws.normal();
+    A.multiply(any, b, room);
+    int nulls = 0;
+    const std::vector<double> want = dense.least(b, nulls);
+    GraphFactor factor(A);
+    ASSERT_EQ(factor.factor(A, 1e-10, true), -1);
+    EXPECT_EQ(factor.n_null(), nulls);
+    const double asked = std::max(1.0, largest(b));
+    for (const bool least : {false, true}) {
+      EXPECT_LT(factor.solve(A, b, x, least), 1e-10 * asked);
+      std::vector<double> back(A.size());
+      A.multiply(x, back, room);
+      for (int i = 0; i < A.size(); ++i) EXPECT_NEAR(back[i], b[i], 1e-9 * asked);
+    }
+    for (int i = 0; i < A.size(); ++i)
+      EXPECT_NEAR(x[i], want[i], 1e-6 * std::max(1.0, largest(want))) << i;
+    SolverOptions options;
+    options.tolerance = 1e-10;
+    GraphConjugateGradient iteration(options);
+    const Report report = iteration.solve(A, b, x);
+    ASSERT_TRUE(report.ok()) << to_string(report.outcome) << " at " << report.error_estimate;
+    for (int i = 0; i < A.size(); ++i)
+      EXPECT_NEAR(x[i], want[i], 1e-6 * std::max(1.0, largest(want))) << i;
+  }
+}
+
+TEST(GraphFactor, SaysByHowMuchRowsContradictEachOther) {
+  Draws draws(3);
+  const BlockGraph A = random_graph(9, 4, true, draws);
+  std::vector<double> b(A.size()), x(A.size());
+  for (double& bi : b) bi = draws.normal();
+  GraphFactor factor(A);
+  ASSERT_EQ(factor.factor(A, 1e-10, false), -1);
+  ASSERT_GT(factor.n_null(), 0);
+  EXPECT_GT(factor.solve(A, b, x, false), 1e-3);
+}
+
+// What stands before a front has been eliminated, and every row once.
+TEST(EliminationOrder, TakesEveryNodeOnceAndChildrenFirst) {
+  for (int sample = 0; sample < 40; ++sample) {
+    SCOPED_TRACE(sample);
+    Draws draws(100 + sample);
+    const int nodes = 1 + draws.below(60);
+    const BlockGraph A = random_graph(nodes, 1 + draws.below(nodes), false, draws);
+    std::vector<int> seen(A.n()), hubs(A.n_hubs());
+    const std::vector<Front> fronts = elimination_order(A);
+    for (int f = 0; f < static_cast<int>(fronts.size()); ++f) {
+      for (const int i : fronts[f].rest) EXPECT_EQ(seen[i], 0);
+      for (const int i : fronts[f].pivots) ++seen[i];
+      for (const int k : fronts[f].hubs) ++hubs[k];
+      for (const int child : fronts[f].children) {
+        EXPECT_LT(child, f);
+        for (const int i : fronts[child].rest) {
+          const auto among = [&](const std::vector<int>& list) {
+            return std::find(list.begin(), list.end(), i) != list.end();
+          };
+          EXPECT_TRUE(among(fronts[f].pivots) || among(fronts[f].rest));
+        }
+      }
+    }
+    for (int i = 0; i < A.n(); ++i) EXPECT_EQ(seen[i], A.dim(i) > 0);
+    for (int k = 0; k < A.n_hubs(); ++k) EXPECT_LE(hubs[k], 1);
+  }
+}
+
+// A tree fills in nothing, whatever the order of its nodes: the work of a chain grows as its
+// length.
+TEST(EliminationOrder, ChainsAndRingsAreLinear) {
+  const auto work = [](int n, bool ring) {
+    std::vector<int> dims(n, 5);
+    std::vector<std::vector<int>> hubs;
+    for (int i = 0; i < n; ++i) {
+      hubs.push_back({(7 * i) % n});
+      if (i > 0 || ring) hubs.back().push_back((7 * i + n - 1) % n);
+    }
+    BlockGraph A;
+    A.set_structure(dims, hubs);
+    return work_of(A, elimination_order(A));
+  };
+  for (const bool ring : {false, true}) EXPECT_LT(work(1000, ring), 11 * work(100, ring));
+}
+
+}  // namespace
+}  // namespace linkwise::testing
