@@ -221,7 +221,15 @@ stiffness ref springref class file count fromto inertia diaginertia fullinertia 
 angle gravity timestep qpos qvel joint body1 body2 density builtin width height nrow ncol solref
 gear ctrlrange gravcomp mocap childclass prefix polycoef"""
 MJCF_WORDS = (_MJCF_ELEMENTS.split(), _MJCF_ATTRIBUTES.split())
-SDFS = (PRESS, PRESS.replace('type="prismatic"', 'type="ball"'))
+#: A model in a model, in a world with another.
+_HALL = PRESS.replace("<model ", '<world name="hall"><model name="cell"><model ', 1).replace(
+    "</sdf>",
+    '<link name="table"/><joint name="stand" type="fixed"><parent>table</parent>'
+    '<child>press</child></joint></model><model name="wall"><static>true</static>'
+    '<link name="w"/></model><joint name="feet" type="ball"><parent>wall::w</parent>'
+    "<child>cell::table</child></joint></world></sdf>",
+)
+SDFS = (PRESS, PRESS.replace('type="prismatic"', 'type="ball"'), _HALL)
 SDF_WORDS = (
     [
         *_READ,

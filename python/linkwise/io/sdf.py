@@ -14,7 +14,7 @@ import math
 import os
 from collections import Counter, deque
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from lxml import etree
@@ -104,27 +104,20 @@ class _Reader:
         self._notes: list[tuple[str, str, str]] = []
         self._harmless: Counter[str] = Counter()
         self.gravity: tuple[float, float, float] | None = None
-        self._check_version(root)
-        element = self._only_model(root)
-        self.name = element.get("name") or os.path.splitext(os.path.basename(file_name(path)))[0]
-        model = self._element(element, f"model '{shorten(self.name)}'")
-        if self._switched_on(model, "static"):
-            model.fail("is static, so nothing in it moves", "remove <static>")
-        self._frames = Frames(path, model)
+        self._frames = Frames()
         self._joints: list[SdfElement] = []
         self._couplings: list[tuple[str, dict[str, float], float]] = []
         self._leaders: dict[str, str] = {}
         self._follower: dict[str, SdfElement] = {}
-        for child in element.iterchildren(tag=etree.Element):
-            tag = local_name(child)
-            if tag in ("include", "model"):
-                title = f"element '{tag}'"
-                remedy = "write links and joints into one model (gz sdf -p expands includes)"
-                complain(path, title, "models within models are not read", remedy, child.sourceline)
-            if tag in ("link", "joint", "frame") and not is_foreign(child, root):
-                self._add_named(child, tag)
+        self._check_version(root)
+        top = self._read_top(root)
+        self.name = top.get("name") or os.path.splitext(os.path.basename(file_name(path)))[0]
         if not self._frames.links:
-            model.fail("has no links", "give a model of links and joints")
+            still = local_name(top) == "model" and self._is_static(top)
+            problem = "is static, so nothing in it moves" if still else "has no links that move"
+            remedy = "remove <static>" if still else "give a model of links and joints"
+            title = f"{local_name(top)} '{shorten(self.name)}'"
+            complain(path, title, problem, remedy, top.sourceline)
 
     # -- what the file holds --------------------------------------------------------------------
 
@@ -142,25 +135,76 @@ class _Reader:
                 root.sourceline,
             )
 
-    def _only_model(self, root: etree._Element) -> etree._Element:
+    def _read_top(self, root: etree._Element) -> etree._Element:
+        """Reads the one model of the file, or what stands in its world. Of a world with one model
+        that moves, that one is the machine, and its names are as it writes them."""
         worlds = [c for c in root.iterchildren(tag=etree.Element) if local_name(c) == "world"]
         inside = list((worlds[0] if worlds else root).iterchildren(tag=etree.Element))
         models = [c for c in inside if local_name(c) == "model"]
-        if len(worlds) > 1 or len(models) != 1:
+        if len(worlds) > 1 or not models or (len(models) > 1 and not worlds):
             count = f"{len(worlds)} worlds" if len(worlds) > 1 else f"{len(models)} models"
-            remedy = "give a file with one <model>; included ones are not fetched"
+            remedy = "give a file with one <model>, or a <world> of several"
             complain(self._path, "sdf", f"holds {count}", remedy, root.sourceline)
+        moving = [model for model in models if not self._is_static(model)]
+        tied = [c for c in inside if worlds and local_name(c) in ("joint", "frame")]
+        alone = len(moving) == 1 and not tied
         for child in inside if worlds else ():
             tag = local_name(child)
             if tag == "gravity":
                 given = SdfElement(self._path, child, "world").numbers("value", 3, "gravity")
                 self.gravity = (given[0], given[1], given[2])
-            elif tag in ("include", "joint", "frame"):
-                remedy = "write what belongs to the machine into its model"
-                complain(self._path, "world", f"<{tag}> is not read", remedy, child.sourceline)
-        return models[0]
+            elif tag == "include":
+                self._refuse_include(child)
+        for model in models:
+            named = not (alone and model is moving[0]) and len(models) + len(tied) > 1
+            self._read_model(model, WORLD, "", named=named)
+        for child in tied:
+            self._add_named(child, local_name(child), "", WORLD)
+        return models[0] if len(models) == 1 else moving[0] if alone else worlds[0]
 
-    def _element(self, element: etree._Element, title: str) -> SdfElement:
+    def _refuse_include(self, element: etree._Element) -> NoReturn:
+        problem, remedy = "includes are not fetched", "write them out (gz sdf -p FILE)"
+        complain(self._path, "element 'include'", problem, remedy, element.sourceline)
+
+    def _is_static(self, model: etree._Element) -> bool:
+        return self._switched_on(SdfElement(self._path, model, "model"), "static")
+
+    def _read_model(
+        self,
+        element: etree._Element,
+        outside: str,
+        scope: str,
+        *,
+        named: bool = True,
+        static: bool = False,
+    ) -> None:
+        """A model in the frame `outside`, where `scope` stands before names; named: so does its own
+        name inside it. Links of a static one are parts of the world."""
+        name = element.get("name", "")
+        model = self._element(element, f"model '{shorten(name)}'", scope)
+        static = static or self._is_static(element)
+        if named and not name:
+            model.fail("has no name", 'add name="..."')
+        if named and self._frames.taken(scope + name):
+            model.fail("the name is used twice", "rename one of them")
+        inside = f"{scope}{name}::" if named else scope
+        self._frames.add_model(model, inside, outside, static=static)
+        if static:
+            self._notes.append(
+                ("info", scope + name, "is static: its links are parts of the world")
+            )
+        for child in element.iterchildren(tag=etree.Element):
+            tag = local_name(child)
+            if is_foreign(child, element):
+                continue
+            if tag == "include":
+                self._refuse_include(child)
+            if tag == "model":
+                self._read_model(child, inside + MODEL, inside, static=static)
+            if tag in ("link", "joint", "frame"):
+                self._add_named(child, tag, inside, inside + MODEL, static=static)
+
+    def _element(self, element: etree._Element, title: str, scope: str = "") -> SdfElement:
         """The element, whose children of unknown names are noted."""
         tag = local_name(element)
         read, harmless = _READ[tag].split(), _HARMLESS.get(tag, "").split()
@@ -173,35 +217,45 @@ class _Reader:
                 self._warn(title, f"{text} (line {child.sourceline})")
             elif name in _READ and name not in ("link", "joint", "frame"):
                 self._element(child, title)
-        return SdfElement(self._path, element, title)
+        found = SdfElement(self._path, element, title)
+        found.scope = scope
+        return found
 
-    def _add_named(self, element: etree._Element, tag: str) -> None:
+    def _add_named(
+        self, element: etree._Element, tag: str, scope: str, model: str, *, static: bool = False
+    ) -> None:
+        """A link, joint or frame of the model whose frame is `model`."""
         name = element.get("name", "")
-        found = self._element(element, f"{tag} '{shorten(name)}'" if name else tag)
+        title = f"{tag} '{shorten(scope + name)}'" if name else tag
+        found = self._element(element, title, scope)
         if not name:
             found.fail("has no name", 'add name="..."')
         if name in (WORLD, MODEL) or (name.startswith("__") and name.endswith("__")):
             found.fail("has a name that the format reserves", "rename it")
+        name = scope + name
         if self._frames.taken(name):
             found.fail("the name is used twice", "rename one of them")
         self.found[f"{tag} '{name}'"] = found
-        if tag == "link":
-            self._frames.links[name] = found
-            self._frames.add(name, found, MODEL, name)
+        if tag == "link" and not static:
+            self._frames.add_link(name, found)
+        elif tag == "link":
+            self._frames.add(name, found, model, WORLD)
         elif tag == "frame":
-            attached_to = found.get("attached_to") or MODEL
-            self._frames.add(name, found, attached_to, attached_to)
+            attached_to = found.get("attached_to")
+            on = found.full(attached_to) if attached_to else model
+            self._frames.add(name, found, on, on)
         else:
             child = self._end(found, "child")
             self._frames.add(name, found, child, child)
-            self._joints.append(found)
+            if not static:
+                self._joints.append(found)
 
     def _end(self, joint: SdfElement, role: str) -> str:
         end = joint.child(role)
         text = None if end is None else end.get("value")
         if text is None:
             joint.fail(f"has no {role}", f"add <{role}>LINK</{role}>")
-        return text.strip()
+        return joint.full(text.strip())
 
     @staticmethod
     def _switched_on(element: SdfElement, name: str, default: bool = False) -> bool:
@@ -256,7 +310,7 @@ class _Reader:
 
     def _couple(self, name: str, axis: SdfElement, mimic: SdfElement) -> None:
         """follower = multiplier (leader - reference) + offset, as the format says."""
-        leader = mimic.get("joint") or ""
+        leader = mimic.full(mimic.get("joint") or "")
         if leader == name:
             axis.fail("mimics itself", "name another joint")
         if f"joint '{leader}'" not in self.found:
@@ -273,14 +327,13 @@ class _Reader:
         self, element: SdfElement, joints: list[SdfJoint]
     ) -> tuple[str, dict[str, float], float]:
         """theta_2 = -ratio theta_1, the angles of child and parent against the reference body."""
-        name = str(element.get("name"))
+        name = element.full(str(element.get("name")))
         if element.get("gearbox_reference_body") is None:
             remedy = "name the link in which both of its shafts turn"
             element.fail("has no <gearbox_reference_body>", remedy)
         ratio = element.number("gearbox_ratio", "gearbox_ratio")
-        housing = self._frames.link_of(
-            str(element.get("gearbox_reference_body")).strip(), element, "gearbox_reference_body"
-        )
+        reference = element.full(str(element.get("gearbox_reference_body")).strip())
+        housing = self._frames.link_of(reference, element, "gearbox_reference_body")
         pose = self._frames.pose(name, element)
         factors: dict[str, float] = {}
         for role, tag, factor in (("parent", "axis", ratio), ("child", "axis2", 1.0)):
@@ -350,7 +403,7 @@ class _Reader:
         builder.add_link(name, mass=mass, com=placed[:3, 3], inertia=inertia)
 
     def _joint(self, element: SdfElement) -> SdfJoint:
-        name, kind = str(element.get("name")), element.get("type")
+        name, kind = element.full(str(element.get("name"))), element.get("type")
         if kind not in JOINT_TYPES:
             problem = "has no type" if kind is None else f"type '{shorten(kind)}' is not read"
             element.fail(problem, f"use one of {', '.join(JOINT_TYPES)}, gearbox")
@@ -399,7 +452,8 @@ class _Reader:
         if not expressed and self._switched_on(axis, "use_parent_model_frame"):
             expressed = MODEL
         if expressed:
-            direction = pose[:3, :3].T @ self._frames.pose(expressed, xyz)[:3, :3] @ direction
+            turned = self._frames.pose(xyz.full(expressed), xyz)[:3, :3]
+            direction = pose[:3, :3].T @ turned @ direction
         length = math.hypot(*direction)
         return [float(x) / length for x in direction] if length > 0 else [0.0, 0.0, 0.0]
 

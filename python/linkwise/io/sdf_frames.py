@@ -1,10 +1,15 @@
-"""Poses and frames of an SDF model: what is placed against what, and on which link it sits."""
+"""Poses and frames of an SDF: what is placed against what, and on which link it sits.
+
+Models may stand in models. What one names is looked up in it, and `inner::name` is inside the model
+`inner` of it. Here every name is written from the outermost model, and so are those of the result.
+"""
 
 from __future__ import annotations
 
 import math
-import os
+from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -26,6 +31,7 @@ _ATTRIBUTES = {
     "rotation_format",
     "attached_to",
     "canonical_link",
+    "placement_frame",
     "auto",
     "joint",
     "frame",
@@ -34,6 +40,19 @@ _ATTRIBUTES = {
 
 class SdfElement(UrdfElement):
     """An element of an SDF, whose values are texts of its children."""
+
+    #: What stands before the names that it uses: "outer::inner::".
+    scope = ""
+
+    def child(self, tag: str) -> Self | None:
+        found = super().child(tag)
+        if found is not None:
+            found.scope = self.scope
+        return found
+
+    def full(self, name: str) -> str:
+        """A name that the element uses, from the outermost model."""
+        return name if name == WORLD else self.scope + name
 
     def get(self, attribute: str) -> str | None:
         """An attribute, the text of a child of that name, or under "value" the element's own."""
@@ -61,6 +80,7 @@ def pose_of(element: SdfElement) -> tuple[Array, str]:
     if pose is None:
         return np.eye(4), ""
     reference = pose.get("relative_to") or ""
+    reference = reference and pose.full(reference)
     if pose.get("frame"):
         pose.fail("<pose frame> is of SDF 1.5 and was never defined", "write relative_to")
     if pose.get("value") is None:
@@ -116,19 +136,19 @@ class _Place:
     pose: Array
     reference: str
     attached_to: str
+    #: Of a model: the frame in it that its pose places, if that is not its own.
+    placed: str = ""
 
 
 class Frames:
-    """The frames of one model: its links, joints and frames by name, and `__model__`, `world`."""
+    """Links, joints, frames and models by name. The frame of a model in which `scope` names things
+    is `scope__model__`."""
 
-    def __init__(self, path: str | os.PathLike[str], model: SdfElement) -> None:
-        pose, reference = pose_of(model)
-        if reference not in ("", WORLD):
-            model.fail("its pose is relative to what is no part of it", "place it in the world")
-        self._model = model
+    def __init__(self) -> None:
         self._places: dict[str, _Place] = {}
-        self._known: dict[str, Array] = {WORLD: np.eye(4), MODEL: pose}
-        self._path = path
+        self._known: dict[str, Array] = {WORLD: np.eye(4)}
+        self._models: dict[str, tuple[SdfElement, str]] = {}
+        self._first: dict[str, str] = {}
         self.links: dict[str, SdfElement] = {}
 
     def add(self, name: str, element: SdfElement, default: str, attached_to: str) -> None:
@@ -136,38 +156,67 @@ class Frames:
         pose, reference = pose_of(element)
         self._places[name] = _Place(element, pose, reference or default, attached_to)
 
+    def add_link(self, name: str, element: SdfElement) -> None:
+        self.links[name] = element
+        self._first.setdefault(element.scope, name)
+        self.add(name, element, element.full(MODEL), name)
+
+    def add_model(self, element: SdfElement, inside: str, outside: str, *, static: bool) -> None:
+        """A model whose names are those that begin with `inside`, in the frame `outside`."""
+        frame = inside + MODEL
+        self.add(frame, element, outside, WORLD if static else frame)
+        placed = element.get("placement_frame")
+        if placed:
+            self._places[frame].placed = inside + placed
+        self._models[frame] = element, inside
+        if inside:  # by its name from outside, too
+            self._places[inside.removesuffix("::")] = _Place(element, np.eye(4), frame, frame)
+
     def taken(self, name: str) -> bool:
         return name in self._places
 
     def pose(self, name: str, asker: SdfElement) -> Array:
         """The pose (4, 4) of a frame in the world as the file draws the model."""
-        chain: list[str] = []
-        seen: set[str] = set()
+        chain = self._chain(name, asker, self._known)
+        found = self._known[self._places[chain[-1]].reference] if chain else self._known[name]
+        for frame in reversed(chain):
+            found = self._known[frame] = found @ self._own(frame)
+        return found
+
+    def _chain(self, name: str, asker: SdfElement, ends: Collection[str]) -> list[str]:
+        """The frame and those that it is placed against, up to one of `ends`, which is left out."""
+        chain: dict[str, None] = {}
         at = name
-        while at not in self._known:
+        while at not in ends:
             place = self._places.get(at)
             if place is None:
-                known = [*self._places, MODEL]
                 asker.fail(
-                    f"names the frame '{shorten(at)}', which does not exist", near(at, known)
+                    f"names the frame '{shorten(at)}', which does not exist", near(at, self._places)
                 )
-            if at in seen:
+            if at in chain:
                 place.element.fail("its pose is relative to itself", "give it another relative_to")
-            chain.append(at)
-            seen.add(at)
+            chain[at] = None
             asker, at = place.element, place.reference
-        found = self._known[at]
-        for frame in reversed(chain):
-            found = self._known[frame] = found @ self._places[frame].pose
-        return found
+        return list(chain)
+
+    def _own(self, frame: str) -> Array:
+        """The pose (4, 4) of a frame in the one that it is placed against."""
+        place = self._places[frame]
+        if not place.placed:
+            return place.pose
+        chain = self._chain(place.placed, place.element, (frame, WORLD))
+        if chain and self._places[chain[-1]].reference == WORLD:
+            place.element.fail("its placement_frame is placed in the world", "name another frame")
+        inside = np.eye(4)
+        for each in reversed(chain):
+            inside = inside @ self._own(each)
+        return place.pose @ np.linalg.inv(inside)
 
     def link_of(self, name: str, asker: SdfElement, role: str) -> str:
         """The link that a frame sits on, or "world"."""
         seen: set[str] = set()
         at = name
         while at not in self.links and at != WORLD:
-            if at == MODEL:
-                return self._canonical()
             place = self._places.get(at)
             if place is None:
                 asker.fail(f"{role} '{shorten(at)}' does not exist", near(at, self.links))
@@ -175,13 +224,22 @@ class Frames:
                 place.element.fail("it is attached to itself", "attach it to a link")
             seen.add(at)
             asker, role, at = place.element, "attached_to", place.attached_to
+            if at in seen and at in self._models:
+                at = self._canonical(at)
         return at
 
-    def _canonical(self) -> str:
-        name = self._model.get("canonical_link")
-        if name is None:
-            return next(iter(self.links))
-        if name not in self.links:
-            problem = f"canonical_link '{shorten(name)}' does not exist"
-            self._model.fail(problem, near(name, self.links))
-        return name
+    def _canonical(self, frame: str) -> str:
+        """The link of a model that carries its frame, or the model in it whose link does."""
+        model, scope = self._models[frame]
+        name = model.get("canonical_link")
+        if name:
+            if scope + name not in self.links:
+                problem = f"canonical_link '{shorten(name)}' does not exist"
+                model.fail(problem, near(scope + name, self.links))
+            return scope + name
+        if scope in self._first:
+            return self._first[scope]
+        for nested in self._models:
+            if nested.startswith(scope) and nested != frame:
+                return nested
+        model.fail("has no links", "give a model of links and joints")

@@ -15,8 +15,20 @@ WRONG = [
     ('version="1.9"', 'version="1.4"', ":2: sdf: version '1.4' is not read; convert it"),
     ('version="1.9"', "", ":2: sdf: version '' is not read; "),
     ("</sdf>", "<model name='n'/></sdf>", ":2: sdf: holds 2 models; give a file with one <model>"),
-    ("<plugin", "<include/><plugin", "element 'include': models within models are not read; "),
-    ("<plugin", "<model name='n'/><plugin", "element 'model': models within models are not read"),
+    ("<plugin", "<include/><plugin", "element 'include': includes are not fetched; "),
+    ("<plugin", "<model/><plugin", "model '': has no name; "),
+    ("<plugin", "<model name='crank'/><plugin", "model 'crank': the name is used twice; "),
+    (
+        "<plugin",
+        "<model name='n'><link name='l'><pose relative_to='crank'/></link></model><plugin",
+        "link 'n::l': names the frame 'n::crank', which does not exist; ",
+    ),
+    (
+        "<plugin",
+        "<model name='n' placement_frame='f'><link name='l'/>"
+        "<frame name='f'><pose relative_to='world'/></frame></model><plugin",
+        "model 'n': its placement_frame is placed in the world; ",
+    ),
     ("<pose>0 0 1 0 0 0</pose>", "<static>true</static>", "model 'press': is static, so nothing"),
     ('<link name="rod">', "<link>", ":19: link: has no name; add name="),
     ('<link name="rod">', '<link name="crank">', ":19: link 'crank': the name is used twice; "),
