@@ -120,3 +120,58 @@ def accelerations(machine, v, generalised, bias):
     whole = np.block([[H, K.T], [K, np.zeros((len(K), len(K)))]])
     solution = np.linalg.lstsq(whole, np.concatenate([generalised, demand]), rcond=1e-11)[0]
     return solution[:n], solution[n:]
+
+
+#: Directions that the self-stresses of hinges along z leave alone: forces in the plane, and the
+#: hinges' own free moment.
+PLANAR = np.array([1, 1, 0, 0, 0, 1], dtype=bool)
+
+
+def four_bar(cut, *, frames=None, units=(1.0, 1.0, 1.0), cut_the_other_way=False):
+    """Four hinges along z, of which `cut` ("c" or "d") closes the loop.
+
+    frames: axes of each hinge's frame, by name, (3, 3) against the world's; units: what one metre,
+    kilogram and second count.
+    """
+    metre, kilogram, second = units
+    rods = {"crank": ("a", "b"), "coupler": ("b", "c"), "rocker": ("c", "d")}
+    points = {"a": (0, 0, 0), "b": (0.2, 0.5, 0), "c": (1.1, 0.9, 0), "d": (1.3, -0.1, 0)}
+    points = {name: metre * np.array(point, dtype=float) for name, point in points.items()}
+    origin = {"base": np.zeros(3), "crank": points["a"], "coupler": points["b"]}
+    origin["rocker"] = points["d"] if cut == "c" else points["c"]
+    gravity = np.array([0.5, -9.81, 0]) * metre / second**2
+    builder = lw.ModelBuilder("four-bar", gravity=gravity)
+    builder.add_link("base", mass=0)
+    axes = dict.fromkeys("abcd", np.eye(3)) | (frames or {})
+    of_link = {"base": np.eye(3)} | {"crank": axes["a"], "coupler": axes["b"]}
+    of_link["rocker"] = axes["d" if cut == "c" else "c"]
+    for link, ends in rods.items():
+        turn = of_link[link]
+        middle = sum(points[end] for end in ends) / 2 - origin[link]
+        inertia = turn.T @ np.diag([0.02, 0.03, 0.04]) @ turn * kilogram * metre**2
+        builder.add_link(link, mass=1.5 * kilogram, com=turn.T @ middle, inertia=inertia)
+    hinges = {
+        "a": ("base", "crank"),
+        "b": ("crank", "coupler"),
+        "c": ("coupler", "rocker"),
+        "d": ("base", "rocker"),
+    }
+    for name, (parent, child) in hinges.items():
+        if name == cut and cut_the_other_way:
+            parent, child = child, parent
+        sides = [
+            (
+                of_link[link].T @ (points[name] - origin[link]),
+                of_link[link].T @ axes[name],
+            )
+            for link in (parent, child)
+        ]
+        (translation, rotation), (child_translation, child_rotation) = sides
+        where = {"translation": translation, "rotation": rotation}
+        where["axis"] = axes[name].T @ (0.0, 0.0, 1.0)
+        if name == cut:
+            where |= {"child_translation": child_translation, "child_rotation": child_rotation}
+            builder.add_loop(name, "revolute", parent, child, **where)
+        else:
+            builder.add_joint(name, "revolute", parent, child, **where)
+    return builder.build()

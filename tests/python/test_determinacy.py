@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import linkwise as lw
 from linkwise.cli.main import app
+from linkwise.cli.sweep import member_records
 from linkwise.simulation.determinacy import Determinacy
 
 pytestmark = pytest.mark.filterwarnings("ignore::linkwise.ModelWarning")
@@ -157,3 +158,46 @@ def test_what_opens_in_some_poses_only_is_told():
     assert (seen.throughout <= before).all()
     assert (seen.throughout != before).any()
     assert "in some poses only those of joints" in seen.notes()[0].text
+
+
+def test_loads_elsewhere_and_shares_are_in_brackets(stored, monkeypatch, tmp_path):
+    monkeypatch.setenv("COLUMNS", "300")
+    csv_file = tmp_path / "at.csv"
+    asked = ["loads", str(stored.path), "--at", "world"]
+    shown = CliRunner().invoke(app, [*asked, "--csv", str(csv_file)]).output
+    assert "in brackets: not determined by rigid bodies" in shown
+    cells = next(line for line in shown.splitlines() if line.strip().startswith("c ")).split()
+    # joint, force @ s, moment @ s, six components
+    opened = [cell.startswith("(") for cell in cells]
+    assert opened == [False, True, False, False, True, False, False, *~PLANAR]
+    with open(csv_file, newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["quantity"] for row in rows if row["determinate"] == "False"} == {
+        *("force", "moment", "fz", "nx", "ny")
+    }
+    one = CliRunner().invoke(app, [*asked, "--joint", "c"]).output
+    rows = {line.split()[0]: line for line in one.splitlines() if line.strip()}
+    assert rows["fz"].count("(") == 3  # peak, minimum, maximum; not the time
+    assert "(" not in rows["fx"]
+    found = json.loads(CliRunner().invoke(app, [*asked, "--json"]).stdout)
+    by = {(r["joint"], r["quantity"]): r["determinate"] for r in found["loads"]}
+    assert by["c", "fy"]
+    assert not by["c", "nx"]
+    assert not by["c", "moment"]
+    split = ["loads", str(stored.path), "--split", "force"]
+    shown = CliRunner().invoke(app, split).output
+    row = [line for line in shown.splitlines() if "force [N]" in line][-1].split()
+    assert all(cell.startswith("(") for cell in row[4:])
+    found = json.loads(CliRunner().invoke(app, [*split, "--json"]).stdout)
+    assert not any(share["determinate"] for share in found["split"])
+
+
+def test_sweeps_rank_what_is_determined():
+    """The largest force of a member is one that rigid bodies determine, where there is one."""
+    many = lw.simulate_batch(door(2), step=1e-3, duration=0.01, v0=np.array([[0.0], [1.0]]))
+    many = many.assign_coords(speed=("member", [0.0, 1.0]))
+    many["joint_load"][0, :, 1, 0] = 1e6
+    many["determinate"][0, 0] = True
+    first, second = member_records(many, ["speed"])
+    assert (first["force_joint"], first["largest_force_determinate"]) == ("low", True)
+    assert second["largest_force_determinate"] is False

@@ -11,9 +11,10 @@ import typer
 
 from linkwise.cli.loads_at import AtOption, PointOption, show_at
 from linkwise.cli.output import (
-    IN_BRACKETS,
     JsonOption,
     console,
+    in_brackets,
+    meaning_of_brackets,
     number,
     print_json,
     say_warnings,
@@ -258,6 +259,7 @@ def peak_shares(run: Run, model: Model, by: str) -> list[dict[str, Any]]:
     if by not in CAUSES:
         raise InputError(f"--split: {shown(by)} is unknown; use force or motion")
     found = split_at_peaks(run, by, model)  # type: ignore[arg-type]
+    known = found["determinate"].values if "determinate" in found else None
     columns = {name: found[name].values for name in ("time", "total", "peak")}
     columns |= {str(name): found["share"].sel(cause=name).values for name in found["cause"].values}
     return [
@@ -266,6 +268,7 @@ def peak_shares(run: Run, model: Model, by: str) -> list[dict[str, Any]]:
             "quantity": quantity,
             "unit": unit,
             "at_peak": bool(found["at_peak"].values[k, j]),
+            **({"determinate": bool(known[k, j])} if known is not None else {}),
             **{key: float(values[k, j]) for key, values in columns.items()},
         }
         for k, (quantity, unit, _) in enumerate(HALVES)
@@ -277,7 +280,7 @@ def _with_bound(record: dict[str, Any]) -> str:
     shown = number(record["peak"])
     if math.isfinite(record.get("plus_minus", math.nan)):
         shown += f" ± {number(record['plus_minus'], 1)}"
-    return shown if record.get("determinate", True) else f"({shown})"
+    return in_brackets(shown, record)
 
 
 def tables(
@@ -295,13 +298,6 @@ def tables(
     if chosen:
         made.append(_share_table(chosen))
     return made
-
-
-def _bracketed(records: list[dict[str, Any]]) -> str:
-    """What brackets mean, where there are any."""
-    if all(record.get("determinate", True) for record in records):
-        return ""
-    return IN_BRACKETS
 
 
 def _by_force(item: tuple[str, dict[str, dict[str, Any]]]) -> tuple[bool, float]:
@@ -322,7 +318,7 @@ def _all_joints(records: list[dict[str, Any]], some: str) -> Any:
         title += f" (the {_MOST_JOINTS} largest forces of {len(by_joint)} joints)"
     shown = [name for name in _SHOWN if any(name in found for _, found in rows)]
     units = {r["quantity"]: r["unit"] for r in records}
-    title += _bracketed(records)
+    title += meaning_of_brackets(records)
     headings = [(f"{name.replace('_', ' ')} [{units[name]}] @ s", "right") for name in shown]
     result = table(title, [("joint", "left"), *headings])
     for name, found in rows:
@@ -342,7 +338,7 @@ def _joint_table(records: list[dict[str, Any]], joint: str, some: str) -> Any:
     headings = ["peak", "at [s]", "rms", "minimum", "maximum", "duty", *COMPONENTS]
     columns = [("quantity", "left"), *((name, "right") for name in headings)]
     title = f"Load of {text(joint)}{some}; fx ... nz at the time of each peak"
-    title += _bracketed([record for record in records if record["joint"] == joint])
+    title += meaning_of_brackets(record for record in records if record["joint"] == joint)
     result = table(f"{title}, rms and duty of the samples", columns)
     for record in records:
         if record["joint"] != joint:
@@ -361,7 +357,7 @@ def _or_bracketed(record: dict[str, Any], key: str) -> str:
     if key in record.get("not_determinate", "").split():
         return f"({shown})"
     of_quantity = key in ("rms", "minimum", "maximum", "duty")
-    return f"({shown})" if of_quantity and not record.get("determinate", True) else shown
+    return in_brackets(shown, record) if of_quantity else shown
 
 
 def _of_rating(record: dict[str, Any]) -> list[str]:
@@ -372,36 +368,37 @@ def _margin_table(rated: list[dict[str, Any]]) -> Any:
     headings = [("joint", "left"), ("quantity", "left")]
     headings += [(name, "right") for name in ("peak", "at [s]", "rating", "use", "margin")]
     title = "Against the ratings; the bounds of certified peaks count as load"
-    result = table(title + _bracketed(rated), headings)
+    result = table(title + meaning_of_brackets(rated), headings)
     for record in sorted(rated, key=lambda r: (not r.get("determinate", True), -r["use"])):
         style = "red" if record["margin"] < 0 else ""
-        known = record.get("determinate", True)
         result.add_row(
             text(record["joint"]),
             f"{record['quantity'].replace('_', ' ')} [{record['unit']}]",
             _with_bound(record),
             number(record["peak_time"]),
             number(record["rating"]),
-            *((x if known else f"({x})") for x in _of_rating(record)),
+            *(in_brackets(shown, record) for shown in _of_rating(record)),
             style=style,
         )
     return result
 
 
 def _share_table(shares: list[dict[str, Any]]) -> Any:
-    fixed = ("joint", "quantity", "unit", "at_peak", "time", "total", "peak")
+    fixed = ("joint", "quantity", "unit", "at_peak", "determinate", "time", "total", "peak")
     causes = [key for key in shares[0] if key not in fixed]
     beside = not all(record["at_peak"] for record in shares)
     where = "the peak" if not beside else "the peak, of loads marked * at the sample beside it"
     headings = [("joint", "left"), ("of the peak", "left"), ("at [s]", "right"), ("load", "right")]
     headings += [("peak", "right")] if beside else []
     result = table(
-        f"By cause, at {where}, along the load there; the shares add up to it",
+        f"By cause, at {where}, along the load there; the shares add up to it"
+        + meaning_of_brackets(shares),
         [*headings, *((name, "right") for name in causes)],
     )
     for record in shares:
         keys = ("time", "total", *(("peak",) if beside else ()), *causes)
-        cells = [number(record[name]) for name in keys]
+        cells = [number(record["time"])]
+        cells += [in_brackets(number(record[name]), record) for name in keys[1:]]
         cells[1] += "" if record["at_peak"] else " *"
         result.add_row(text(record["joint"]), f"{record['quantity']} [{record['unit']}]", *cells)
     return result

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from linkwise.cli.output import console, number, print_json, say_warnings, table, text, write_csv
+from linkwise.cli.output import (
+    console,
+    in_brackets,
+    meaning_of_brackets,
+    number,
+    print_json,
+    say_warnings,
+    table,
+    text,
+    write_csv,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,6 +99,7 @@ def records_at(found: xr.DataArray) -> list[dict[str, Any]]:
         for k, (name, _, _) in zip((0, 3), HALVES, strict=True)
     }
     each = {name: load[..., k] for k, name in enumerate(COMPONENTS)}
+    known = records_known(found)
     records = []
     for j, joint in enumerate(found["joint"].values.tolist()):
         for name, values in (halves | each).items():
@@ -103,9 +114,24 @@ def records_at(found: xr.DataArray) -> list[dict[str, Any]]:
                     "peak_time": float(times[k]),
                     "minimum": float(column.min()),
                     "maximum": float(column.max()),
+                    **({} if known is None else {"determinate": bool(known[name][j])}),
                 }
             )
     return records
+
+
+def records_known(found: xr.DataArray) -> dict[str, Any] | None:
+    """Whether rigid bodies determine each of the quantities, by joint; None where all are."""
+    from linkwise.base import COMPONENTS, HALVES
+
+    if "determinate" not in found.coords:
+        return None
+    known = found["determinate"].values
+    of_halves = {
+        name: known[:, k : k + 3].all(axis=1)
+        for k, (name, _, _) in zip((0, 3), HALVES, strict=True)
+    }
+    return of_halves | {name: known[:, k] for k, name in enumerate(COMPONENTS)}
 
 
 def _table_at(records: list[dict[str, Any]], about: dict[str, str]) -> Any:
@@ -114,6 +140,7 @@ def _table_at(records: list[dict[str, Any]], about: dict[str, str]) -> Any:
         by_joint.setdefault(record["joint"], []).append(record)
     where = f"{about['frame']}, about {about['point']}"
     title = f"Largest loads at the samples, inboard on outboard body; {where}"
+    title += meaning_of_brackets(records)
     if len(by_joint) == 1:
         headings = [("quantity", "left"), ("peak", "right"), ("at [s]", "right")]
         headings += [(name, "right") for name in ("minimum", "maximum")]
@@ -121,6 +148,10 @@ def _table_at(records: list[dict[str, Any]], about: dict[str, str]) -> Any:
         for record in records:
             keys = ("peak", "peak_time", "minimum", "maximum")
             cells = [number(record[key]) for key in keys]
+            cells = [
+                cell if key == "peak_time" else in_brackets(cell, record)
+                for key, cell in zip(keys, cells, strict=True)
+            ]
             result.add_row(f"{record['quantity']} [{record['unit']}]", *cells)
         return result
     first = next(iter(by_joint.values()))
@@ -132,9 +163,8 @@ def _table_at(records: list[dict[str, Any]], about: dict[str, str]) -> Any:
     result = table(text(title), headings)
     for name, row in by_joint.items():
         shown = [
-            f"{number(r['peak'])} @ {number(r['peak_time'])}"
-            if r["quantity"] in timed
-            else number(r["peak"])
+            in_brackets(number(r["peak"]), r)
+            + (f" @ {number(r['peak_time'])}" if r["quantity"] in timed else "")
             for r in row
         ]
         result.add_row(text(name), *shown)

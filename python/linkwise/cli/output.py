@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -102,8 +102,19 @@ def number(value: float, digits: int = 4) -> str:
 
 
 _KNOWN = ("force_determinate", "moment_determinate")
-#: What titles of tables add where there are any.
 IN_BRACKETS = "; in brackets: not determined by rigid bodies, one choice of many"
+
+
+def in_brackets(shown: str, record: Mapping[str, Any], name: str = "determinate") -> str:
+    """What is shown of a record, in brackets where rigid bodies do not determine it."""
+    return shown if not shown or record.get(name, True) else f"({shown})"
+
+
+def meaning_of_brackets(records: Iterable[Mapping[str, Any]], *names: str) -> str:
+    """What titles of tables add where there are any."""
+    every = names or ("determinate",)
+    known = all(record.get(name, True) for record in records for name in every)
+    return "" if known else IN_BRACKETS
 
 
 def whose(extremes: str) -> str:
@@ -127,8 +138,7 @@ def peak_records(run: Run) -> tuple[list[dict[str, Any]], str]:
 
 def bracketed(record: Mapping[str, Any], name: str) -> str:
     """A force or a moment, in brackets where rigid bodies do not determine it."""
-    shown = number(record[name])
-    return shown if record.get(f"{name}_determinate", True) else f"({shown})"
+    return in_brackets(number(record[name]), record, f"{name}_determinate")
 
 
 def peak_table(records: Sequence[Mapping[str, Any]], extremes: str, limit: int = 40) -> Table:
@@ -140,8 +150,7 @@ def peak_table(records: Sequence[Mapping[str, Any]], extremes: str, limit: int =
             shown, key=lambda record: (not record.get(_KNOWN[0], True), -record["force"])
         )[:limit]
         title += f" (the {limit} largest forces of {len(records)} joints)"
-    if not all(record.get(name, True) for record in shown for name in _KNOWN):
-        title += IN_BRACKETS
+    title += meaning_of_brackets(shown, *_KNOWN)
     made = table(
         title,
         [

@@ -9,10 +9,10 @@ import typer
 
 from linkwise.cli.output import (
     FAILED,
-    IN_BRACKETS,
     JsonOption,
     bracketed,
     console,
+    meaning_of_brackets,
     number,
     print_json,
     say_warnings,
@@ -80,6 +80,8 @@ def sweep(
 
 def member_records(found: xr.Dataset, keys: list[str]) -> list[dict[str, Any]]:
     """Per member its values, how it went, and the largest force and moment and where."""
+    import numpy as np
+
     from linkwise.base import HALVES
     from linkwise.loads import peak_loads
 
@@ -93,14 +95,16 @@ def member_records(found: xr.Dataset, keys: list[str]) -> list[dict[str, Any]]:
             if peaks is None:
                 continue
             own = peaks[half].isel(member=k).values
-            at = int(own.argmax())  # of NaN, where a member has no samples
+            known = np.ones(own.shape, dtype=np.bool_)
+            if f"{half}_determinate" in peaks:
+                known = peaks[f"{half}_determinate"].isel(member=k).values
+                record[f"largest_{half}_determinate"] = bool(known.any())
+            # What is one choice of many is not ranked among the others; NaN: there are no samples.
+            at = int(np.where(known, own, -1.0 if known.any() else own).argmax())
             record |= {
                 f"largest_{half}": float(own[at]),
                 f"{half}_joint": str(found["joint"].values[at]),
             }
-            if f"{half}_determinate" in peaks:
-                known = peaks[f"{half}_determinate"].isel(member=k).values[at]
-                record[f"largest_{half}_determinate"] = bool(known)
         records.append(record)
     return records
 
@@ -111,8 +115,7 @@ def _member_table(records: list[dict[str, Any]], keys: list[str]) -> Any:
     columns += [("moment [N m]", "right"), ("joint", "left")]
     title = "Largest joint loads of each member"
     halves = [f"largest_{half}" for half in ("force", "moment")]
-    if not all(record.get(f"{half}_determinate", True) for record in records for half in halves):
-        title += IN_BRACKETS
+    title += meaning_of_brackets(records, *(f"{half}_determinate" for half in halves))
     made = table(title, columns)
     for record in records:
         values = [v if isinstance(v, str) else number(v) for v in (record[key] for key in keys)]

@@ -9,8 +9,9 @@ import numpy as np
 
 from linkwise import _core
 from linkwise._core import InputError, NumericsError
-from linkwise.base import HALVES, Array, lengths
+from linkwise.base import HALVES, AnyArray, Array, lengths
 from linkwise.io.complaint import check_one_of
+from linkwise.loads.determinate import ABOUT_DETERMINATE, components_of, halves_of
 from linkwise.loads.extremes import (
     MISSED,
     load_at_extremes,
@@ -31,6 +32,7 @@ from linkwise.loads.samples import (
     rows,
 )
 from linkwise.notes import recorded_warnings
+from linkwise.record.schema import DETERMINATE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -239,8 +241,9 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
 
     Returns:
         DataArray (time, cause, joint, component), frame and signs as `joint_load`. Causes that the
-        run cannot have are left out. Loads that rigid bodies do not determine (attribute
-        `undetermined`) are split by the rule that chose them. NaN where closed loops are in a
+        run cannot have are left out. Loads that rigid bodies do not determine (coordinate
+        `determinate` (joint, component), attribute `undetermined`) are split by the rule that chose
+        them. NaN where closed loops are in a
         singular position. At the samples: the attribute `samples` says what these miss,
         and `split_at_peaks` is what the peaks are made of.
     """
@@ -257,6 +260,7 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
             "cause": made.names,
             "joint": ("joint", joint_names(run)),
             "component": given["component"],
+            **_mark(("joint", "component"), components_of(run)),
         },
         attrs={
             **given.attrs,
@@ -280,6 +284,7 @@ def split_at_peaks(run: RunLike, by: By = "force", model: Model | None = None) -
         Dataset over (quantity, joint): `share` (cause, quantity, joint), its part along the load at
         `time` [s], whose size `total` the shares add up to; `peak`, that of `peak_loads`, which
         `total` is too, to 1 % where wrenches act from outside, which are interpolated;
+        of machines with loops `determinate`, as in `summary`;
         `at_peak`: 1 where the load is taken at the peak, 0 where it is that of the sample beside it
         with the larger load. That is so where the run does not hold the machine's state at the
         peak: of machines with more than 50 joints, without extremes, or where wrenches from outside
@@ -315,6 +320,7 @@ def split_at_peaks(run: RunLike, by: By = "force", model: Model | None = None) -
     arrays = {"time": when, "total": total, "peak": peak, "at_peak": at_peak.astype(float)}
     data: dict[str, Any] = {name: (dims, arrays[name], about[name]) for name in arrays}
     data["share"] = (("cause", *dims), share, {"long_name": "part along the load", **of})
+    data |= _mark(dims, halves_of(run))
     return xr.Dataset(
         data,
         coords={
@@ -324,6 +330,11 @@ def split_at_peaks(run: RunLike, by: By = "force", model: Model | None = None) -
         },
         attrs={f"cause {name}": CAUSES[by][name] for name in made.names} | _undetermined(run),
     )
+
+
+def _mark(dims: tuple[str, str], known: AnyArray | None) -> dict[str, Any]:
+    """The variable that says what rigid bodies determine, where the run tells."""
+    return {} if known is None else {DETERMINATE: (dims, known, dict(ABOUT_DETERMINATE))}
 
 
 def _undetermined(run: RunLike) -> dict[str, str]:

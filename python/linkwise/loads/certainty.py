@@ -21,6 +21,7 @@ import numpy as np
 from linkwise import _core
 from linkwise._core import InputError
 from linkwise.base import AnyArray, Array, lengths
+from linkwise.loads.determinate import loop_rows, quantities_of
 from linkwise.loads.engineering import derive, derived_rows, joint_directions
 from linkwise.loads.extremes import extremes_of, quantity_rows
 from linkwise.loads.peaks import summary
@@ -50,21 +51,6 @@ SAFETY = 2.0
 STEPS_SHARE = 0.1
 # Rounding of the wrench recursion, relative to the largest load of the sample.
 _ROUNDING = 64 * np.finfo(np.float64).eps
-
-#: Directions that loop joints hold. The search for undetermined loads is dense: about a second
-#: for so many.
-MOST_ROWS = 1000
-#: Cosines below this, or above one less this, are across an axis, or along it.
-_ALIGNED = 1e-9
-#: Which half of a load a quantity is of, and which part of it, seen along the joint's axis.
-_PARTS = {
-    "force": (0, "whole"),
-    "axial": (0, "along"),
-    "radial": (0, "across"),
-    "moment": (1, "whole"),
-    "torque": (1, "along"),
-    "tilting_moment": (1, "across"),
-}
 
 
 def refined_loads(run: RunLike, model: Model, where: slice) -> Array:
@@ -139,31 +125,12 @@ def _algebraic(run: RunLike, model: Model, names: list[str]) -> Array:
 
 
 def _undetermined(run: RunLike, model: Model, names: list[str]) -> AnyArray:
-    """Which quantities (quantity, joint) hold components that rigid bodies do not determine at the
-    start or in the middle of the run."""
+    """Which quantities (quantity, joint) rigid bodies do not determine, or may not."""
     directions = joint_directions(model)
-    found = np.zeros((len(names), len(directions)), dtype=bool)
-    if not model.n_loops and not model.coupling_names:
-        return found
-    if sum(6 - freedom for freedom in model.loop_nv) + len(model.coupling_names) > MOST_ROWS:
-        return ~found
-    given = list(given_motions(run, model))
-    held = model.prescribe(given) if given else model
-    middle = run.dataset.sizes["time"] // 2
-    masks = [
-        np.asarray(_core.indeterminacy(held, q).determinate, dtype=bool)
-        for q in rows(run, "position", [0, middle])
-    ]
-    free = ~np.all(masks, axis=0).reshape(-1, 2, 3)
-    along = np.abs(directions)
-    for k, name in enumerate(names):
-        if name not in _PARTS:
-            continue
-        half, part = _PARTS[name]
-        whole = np.ones_like(along, dtype=bool)
-        taken = {"whole": whole, "along": along > _ALIGNED, "across": along < 1 - _ALIGNED}[part]
-        found[k] = (free[:, half] & taken).any(axis=-1)
-    return found
+    if not loop_rows(model):
+        return np.zeros((len(names), len(directions)), dtype=np.bool_)
+    known = quantities_of(run, model, directions, names)
+    return np.ones((len(names), len(directions)), dtype=np.bool_) if known is None else ~known
 
 
 def _step_tolerance(run: RunLike) -> float:

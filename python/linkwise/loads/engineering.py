@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from linkwise.base import DERIVED, AnyArray, Array, lengths
+from linkwise.base import DERIVED, Array, lengths
+from linkwise.loads.determinate import ABOUT_DETERMINATE, quantities_of
 from linkwise.loads.extremes import what_samples_miss
 from linkwise.loads.members import each_member
 from linkwise.loads.samples import Selection, dof_rows, joint_names, model_of, need, rows, select
@@ -18,10 +18,6 @@ if TYPE_CHECKING:
 
     from linkwise._core import Model
     from linkwise.loads.samples import RunLike
-
-
-# Components of a unit vector that are less are rounding.
-_ALONG = 1e-9
 
 
 class Quantity(NamedTuple):
@@ -101,35 +97,6 @@ def derive(load: Array, directions: Array) -> dict[str, Array]:
     }
 
 
-def determinate_quantities(
-    run: RunLike, directions: Array, names: Sequence[str]
-) -> AnyArray | None:
-    """Whether rigid bodies determine the quantities, (quantity, joint), for axes (joint, 3).
-
-    One is open where a component that it is made of is. None where the run does not tell.
-    """
-    if DETERMINATE not in run.dataset:
-        return None
-    is_open = ~run.dataset[DETERMINATE].values.reshape(-1, 2, 3)
-    along = (np.abs(directions) > _ALONG) | np.isnan(directions)
-    across = (np.abs(directions) < 1 - _ALONG) | np.isnan(directions)
-    parts = {"": np.ones_like(along), "along": along, "across": across}
-    made_of = {
-        "force": (0, ""),
-        "axial": (0, "along"),
-        "radial": (0, "across"),
-        "moment": (1, ""),
-        "tilting_moment": (1, "across"),
-        "torque": (1, "along"),
-    }
-    known = np.ones((len(names), len(is_open)), dtype=np.bool_)
-    for k, name in enumerate(names):
-        if name in made_of:  # the power of a drive is that of its torque, which is given
-            half, part = made_of[name]
-            known[k] = ~(is_open[:, half] & parts[part]).any(axis=1)
-    return known
-
-
 def has_power(run: RunLike) -> bool:
     return "drive_torque" in run.dataset and "velocity" in run.dataset
 
@@ -191,7 +158,8 @@ def quantities(run: RunLike, model: Model | None = None) -> xr.Dataset:
         `torque`, `drive_power`, `drive_energy` [J] (the power's integral since the first sample,
         along the integration's steps where the run holds `work`, else by Simpson's rule). NaN
         where a joint has no single axis. The attribute `samples` says what these miss of the
-        peaks, which `summary` has.
+        peaks, which `summary` has. Of machines with loops the coordinate `determinate`
+        (quantity, joint) says which of them rigid bodies determine.
     """
     import xarray as xr
 
@@ -200,7 +168,11 @@ def quantities(run: RunLike, model: Model | None = None) -> xr.Dataset:
     found = select(run, machine)
     directions = joint_directions(machine)[found.joints]
     values = derived_rows(run, found, directions, slice(None))
-    coords = {"time": run.dataset["time"], "joint": ("joint", joint_names(run))}
+    coords: dict[str, Any] = {"time": run.dataset["time"], "joint": ("joint", joint_names(run))}
+    known = quantities_of(run, machine, directions, list(values))
+    if known is not None:
+        coords["quantity"] = list(values)
+        coords[DETERMINATE] = (("quantity", "joint"), known, dict(ABOUT_DETERMINATE))
     data = {
         name: (("time", "joint"), array, quantity_attrs(name)) for name, array in values.items()
     }

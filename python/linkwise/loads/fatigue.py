@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise._core import InputError, as_floats
-from linkwise.base import COMPONENTS, Array
+from linkwise.base import COMPONENTS, AnyArray, Array
 from linkwise.io.complaint import check_one_of, shown
+from linkwise.loads.determinate import joint_rows, signal_of
 from linkwise.loads.engineering import QUANTITIES, derive, drive_power, has_power, joint_directions
 from linkwise.loads.extremes import extremes_of, quantity_rows, what_samples_miss
 from linkwise.loads.members import each_member
@@ -67,6 +68,17 @@ def signal(
     return values, QUANTITIES[quantity].units
 
 
+def _mark(run: RunLike, joint: str, quantity: str, model: Model | None) -> dict[str, AnyArray]:
+    """The coordinate that says whether rigid bodies determine a signal, where the run tells."""
+    k = joint_position(run, joint)
+    machine = model_of(run, model) if quantity not in COMPONENTS else None
+    direction = np.full(3, np.nan)
+    if machine is not None:
+        direction = joint_directions(machine)[select(run, machine).joints][k]
+    known = signal_of(run, machine, k, quantity, direction)
+    return {} if known is None else {DETERMINATE: np.array(known)}
+
+
 def _turning(run: RunLike, values: Array, joint: int, quantity: str) -> Array:
     """A signal (time,) with the extremes that it has between the samples put in where they were."""
     component = quantity in COMPONENTS
@@ -114,7 +126,8 @@ def cycles(run: RunLike, joint: str, quantity: str, model: Model | None = None) 
     Returns:
         Dataset over `cycle`: `range`, `mean` and `count` (1, or 0.5 for half cycles). The largest
         and the smallest value between the samples are counted where the run holds its extremes;
-        lesser turns that the samples miss are not.
+        lesser turns that the samples miss are not. Of machines with loops the coordinate
+        `determinate` says whether rigid bodies determine the quantity.
     """
     import xarray as xr
 
@@ -127,7 +140,9 @@ def cycles(run: RunLike, joint: str, quantity: str, model: Model | None = None) 
         for k, (name, (text, unit)) in enumerate(about.items())
     }
     about_run = {"method": "ASTM E1049", "samples": what_samples_miss(run, [joint])}
-    return xr.Dataset(data, attrs={"joint": joint, "quantity": quantity, **about_run})
+    coords = _mark(run, joint, quantity, model)
+    about_run |= {"joint": joint, "quantity": quantity}
+    return xr.Dataset(data, coords=coords, attrs=about_run)
 
 
 def equivalent(ranges: Array, counts: Array, exponent: float, repetitions: float) -> float:
@@ -199,10 +214,8 @@ def damage_equivalent(
             for k, m in enumerate(slopes):
                 found[k, j, c] = equivalent(counted[:, 0], counted[:, 2], float(m), count)
     given = run.dataset["joint_load"]
-    known = {}
-    if DETERMINATE in run.dataset:
-        mask = run.dataset[DETERMINATE].values[where]
-        known = {DETERMINATE: (("joint", "component"), mask)}
+    mask = joint_rows(run, names)
+    known = {} if mask is None else {DETERMINATE: (("joint", "component"), mask)}
     return xr.DataArray(
         found,
         dims=("exponent", "joint", "component"),
@@ -225,7 +238,10 @@ def damage_equivalent(
 def load_duration(
     run: RunLike, joint: str, quantity: str, bins: int = 40, model: Model | None = None
 ) -> xr.DataArray:
-    """How long a quantity stays in each class of its range: (level) [s], classes of equal width."""
+    """How long a quantity stays in each class of its range: (level) [s], classes of equal width.
+
+    Of machines with loops with the coordinate `determinate`, as `cycles`.
+    """
     import xarray as xr
 
     values, units = signal(run, joint, quantity, model)
@@ -242,7 +258,10 @@ def load_duration(
     return xr.DataArray(
         time,
         dims="level",
-        coords={"level": ("level", (edges[1:] + edges[:-1]) / 2, level)},
+        coords={
+            "level": ("level", (edges[1:] + edges[:-1]) / 2, level),
+            **_mark(run, joint, quantity, model),
+        },
         attrs={
             "long_name": "time in the class",
             "units": "s",
@@ -256,7 +275,8 @@ def load_duration(
 def spectrum(run: RunLike, joint: str, quantity: str, model: Model | None = None) -> xr.DataArray:
     """One-sided power spectral density of a quantity about its mean: (frequency) [units^2/Hz].
 
-    Periodogram with a Hann window; samples at unequal times are interpolated linearly first.
+    Periodogram with a Hann window; samples at unequal times are interpolated linearly first. Of
+    machines with loops with the coordinate `determinate`, as `cycles`.
     """
     import xarray as xr
     from scipy.signal import periodogram
@@ -273,7 +293,10 @@ def spectrum(run: RunLike, joint: str, quantity: str, model: Model | None = None
     return xr.DataArray(
         density,
         dims="frequency",
-        coords={"frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"})},
+        coords={
+            "frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"}),
+            **_mark(run, joint, quantity, model),
+        },
         attrs={
             "long_name": f"spectral density of {quantity}",
             "units": f"({units})^2/Hz",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple, cast, overload
 
 import numpy as np
@@ -10,12 +10,14 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import Frame, InputError, as_floats
-from linkwise.base import Array
+from linkwise.base import AnyArray, Array
 from linkwise.io.complaint import check_one_of, near, shown
+from linkwise.loads.determinate import components_of, self_stresses, touched
 from linkwise.loads.extremes import what_samples_miss
 from linkwise.loads.members import each_member
 from linkwise.loads.samples import model_of, need_whole, rows
 from linkwise.loads.welds import Weld
+from linkwise.record.schema import DETERMINATE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,14 +93,32 @@ def _of_run(run: RunLike, model: Model, names: Sequence[str]) -> _Loads:
     index = _loaded(model)
     if list(names) == list(index):
         return whole
-    welds = {name for name, _, _ in model.welds}
+    return _with_welds(model, q, whole, names, lambda weld: weld.load(run, whole.child, everything))
+
+
+def _stressed(model: Model, q: Array, loads: Array, names: Sequence[str]) -> _Loads:
+    """The named joints of loads (n, joint, 6) that balance without masses and wrenches."""
+    whole = _of_joints(model, q, loads)
+    return _with_welds(model, q, whole, names, lambda weld: weld.of_joints(q, loads, whole.child))
+
+
+def _with_welds(
+    model: Model,
+    q: Array,
+    whole: _Loads,
+    names: Sequence[str],
+    through: Callable[[Weld], Array],
+) -> _Loads:
+    """The named joints out of the whole machine, whose merged ones carry what is `through` them."""
+    index = _loaded(model)
+    merged = {name for name, _, _ in model.welds}
     found = []
     for name in names:
-        if name in welds:
+        if name in merged:
             weld = Weld(model, name)
-            load = weld.load(run, whole.child, everything)
             parent = _inboard(model, whole.child, model.frame_placement(weld.parent)[0])
-            found.append(_Loads(load, _core.frame_pose(model, q, weld.child), parent))
+            pose = _core.frame_pose(model, q, weld.child)
+            found.append(_Loads(through(weld), pose, parent))
         else:
             k = index[name] if name in index else model.joint_index(name)
             found.append(_Loads(*(part[:, k] for part in whole)))
@@ -234,8 +254,10 @@ def in_frame(
 
     Returns:
         DataArray (time, joint, component), without joint for a single one; `attrs` state frame,
-        point, convention, and what the samples miss of the peaks. Of an array an array
-        (..., joint, 6), or (..., 6).
+        point, convention, and what the samples miss of the peaks. Of machines with loops the
+        coordinate `determinate` (joint, component) says which of them rigid bodies determine in
+        these axes, in every pose that was looked at. Of an array an array (..., joint, 6), or
+        (..., 6).
 
     Raises:
         InputError: the frame or joint is unknown, shapes are wrong, the run lacks a quantity, or
@@ -278,7 +300,46 @@ def _run_in_frame(
     own = set(names) <= set(_loaded(machine))
     attrs["samples"] = what_samples_miss(run, names if own else None)
     made = _labelled(run, names, moved, attrs)
+    mask = _determinate(run, machine, names, frame, at, fixed_in)
+    if mask is not None:
+        made = made.assign_coords({DETERMINATE: (("joint", "component"), mask)})
     return made.isel(joint=0) if isinstance(joint, str) else made
+
+
+def _determinate(
+    run: RunLike,
+    model: Model,
+    names: Sequence[str],
+    frame: str | Frame,
+    point: Array | None,
+    fixed_in: str,
+) -> AnyArray | None:
+    """Which components (joint, 6) rigid bodies determine there; None where the run does not tell.
+
+    In its own frame the run says it. Elsewhere the self-stresses of some poses are seen from there:
+    those of two components may cancel.
+    """
+    own = components_of(run)
+    if own is None:
+        return None
+    index = _loaded(model)
+    of_names = np.array([index.get(name, -1) for name in names])
+    known: AnyArray = np.where((of_names < 0)[:, None], True, own[of_names])
+    if frame == "child" and point is None and (of_names >= 0).all():
+        return known
+    found: AnyArray = np.ones_like(known)
+    stresses = self_stresses(run, model)
+    if not stresses:  # all components mix
+        found[:] = own.all()
+    for q, loads in stresses:
+        if not len(loads):
+            continue
+        several = np.broadcast_to(q, (len(loads), q.size))
+        seen = _stressed(model, several, loads, names)
+        moved, _ = _in_frame(model, several, seen, frame, point, fixed_in)
+        arms = np.linalg.norm(seen.child[..., :3, 3], axis=-1)
+        found &= ~touched(moved, arms).any(axis=0)
+    return found | (known.all(axis=1) & (of_names >= 0))[:, None]
 
 
 def _names(joint: str | Sequence[str]) -> list[str]:

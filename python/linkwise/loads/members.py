@@ -138,7 +138,7 @@ def _along(
         list(found.values()),
         dim=dim,
         data_vars="all",
-        coords="minimal",
+        coords=[name for name in _MASKS if name in next(iter(found.values())).coords],
         compat="override",
         join="outer",
         combine_attrs=_common_attrs,

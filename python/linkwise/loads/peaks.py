@@ -7,10 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.base import HALVES, Array, lengths
+from linkwise.loads.determinate import (
+    ABOUT_DETERMINATE,
+    components_of,
+    halves_of,
+    quantities_of,
+)
 from linkwise.loads.engineering import (
     QUANTITIES,
     derived_rows,
-    determinate_quantities,
     has_power,
     joint_directions,
 )
@@ -34,7 +39,6 @@ if TYPE_CHECKING:
     from linkwise._core import Model
     from linkwise.loads.samples import RunLike
 
-ABOUT_DETERMINATE = {"long_name": "whether rigid bodies determine it throughout the run"}
 # A load counts as on duty above this share of its peak.
 DUTY_LEVEL = 0.1
 
@@ -183,12 +187,11 @@ def summary(run: RunLike, model: Model | None = None) -> xr.Dataset:
     about_missed = "share of the peak that no sample shows"
     unseen = np.where(absent, np.nan, collected.unseen())
     data["missed"] = (dims, unseen, {"long_name": about_missed, "units": "1"})
-    known = determinate_quantities(run, directions, names)
+    known = quantities_of(run, machine, directions, names)
     if known is not None:
         data["determinate"] = (dims, known, dict(ABOUT_DETERMINATE))
-        components = run.dataset[DETERMINATE].values
         about = dict(ABOUT_DETERMINATE)
-        data["wrench_determinate"] = (("joint", "component"), components, about)
+        data["wrench_determinate"] = (("joint", "component"), components_of(run), about)
     given = run.dataset["joint_load"]
     data["wrench"] = ((*dims, "component"), collected.wrench, dict(given.attrs))
     return xr.Dataset(
@@ -240,9 +243,9 @@ def envelope(run: RunLike) -> xr.Dataset:
     data = {name: (dims, values, dict(given.attrs)) for name, values in found.items()}
     for name, values in when.items():
         data[f"{name}_time"] = (dims, values, {"long_name": f"time of the {name}", "units": "s"})
-    if DETERMINATE in run.dataset:
-        known = run.dataset[DETERMINATE]
-        data[DETERMINATE] = (dims, known.values, dict(known.attrs))
+    known = components_of(run)
+    if known is not None:
+        data[DETERMINATE] = (dims, known, dict(ABOUT_DETERMINATE))
     coords = {"joint": ("joint", joint_names(run)), "component": given["component"]}
     return xr.Dataset(data, coords=coords, attrs=_how(between))
 
@@ -277,15 +280,15 @@ def peak_loads(run: RunLike) -> xr.Dataset:
         better = peak > largest
         largest[better] = peak[better]
         when[better] = times[where.start + at.T][better]
-    data = {}
+    data: dict[str, Any] = {}
+    known = halves_of(run)
     for k, (name, units, _) in enumerate(HALVES):
         attrs = {"long_name": f"largest joint {name}", "units": units}
         data[name] = ("joint", largest[k], attrs)
         at_attrs = {"long_name": f"time of the largest joint {name}", "units": "s"}
         data[f"{name}_time"] = ("joint", when[k], at_attrs)
-        if DETERMINATE in run.dataset:
-            known = run.dataset[DETERMINATE].values[:, 3 * k : 3 * k + 3].all(axis=1)
-            data[f"{name}_{DETERMINATE}"] = ("joint", known, dict(ABOUT_DETERMINATE))
+        if known is not None:
+            data[f"{name}_{DETERMINATE}"] = ("joint", known[k], dict(ABOUT_DETERMINATE))
     joints = {"joint": ("joint", run.dataset["joint"].values)}
     attrs = {**kept_warnings(run.dataset.attrs), **_how(between)}
     return xr.Dataset(data, coords=joints, attrs=attrs)

@@ -6,7 +6,8 @@ origin of the joint's child link, and that frame's own acceleration a, turning w
 
     f = m (a - g + w' x c + w x (w x c)),    n = m c x (a - g) + I w' + w x I w,
 
-plus the loads of the joints that hang on them, less the wrenches that act on them from outside.
+plus the loads of the joints that hang on them, less those of joints that close a loop to them, less
+the wrenches that act on them from outside.
 """
 
 from __future__ import annotations
@@ -41,9 +42,11 @@ class Weld:
         for link in self.beyond:  # grows while it is walked
             self.beyond += outboard.get(link, [])
         links = set(self.beyond)
-        self.outboard_joints = [
-            k for k, parent in enumerate(model.parent_link_names) if parent in links
-        ]
+        parents = [*model.parent_link_names, *model.loop_parent_link_names]
+        self._signs = {k: 1.0 for k, parent in enumerate(parents) if parent in links}
+        for k, child in enumerate(model.loop_child_link_names, model.n_joints):
+            if child in links:  # of a joint between two of them nothing is left
+                self._signs[k] = self._signs.get(k, 0.0) - 1.0
         self.body, self._axes, self._origin = model.frame_placement(self.child)
 
     def load(self, run: RunLike, child: Array, where: slice | Sequence[int]) -> Array:
@@ -54,10 +57,16 @@ class Weld:
         q = rows(run, "position", where)
         pose = _core.frame_pose(self.model, q, self.child)
         load = self._of_masses(run, q, pose, where)
-        outboard = rows(run, "joint_load", where)
-        for k in self.outboard_joints:
-            load += carried_to(pose, outboard[:, k], child[:, k])
+        load += self.of_joints(q, rows(run, "joint_load", where), child)
         return load - self._external(run, q, pose, where)
+
+    def of_joints(self, q: Array, loads: Array, child: Array) -> Array:
+        """What loads (n, joint, 6) of all joints alone ask for, (n, 6)."""
+        pose = _core.frame_pose(self.model, q, self.child)
+        total = np.zeros((len(q), 6))
+        for k, sign in self._signs.items():
+            total += sign * carried_to(pose, loads[:, k], child[:, k])
+        return total
 
     def _of_masses(
         self, run: RunLike, q: Array, pose: Array, where: slice | Sequence[int]

@@ -8,32 +8,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from linkwise import _core
 from linkwise._core import InputError
 from linkwise.base import COMPONENTS, AnyArray
 from linkwise.drives import Locked, Motion
-from linkwise.loads.certainty import MOST_ROWS
+from linkwise.loads.determinate import FEW_ROWS, MOST_ROWS, PEAKS, POSES, Held, loop_rows
 from linkwise.notes import Ignored
 
 if TYPE_CHECKING:
     from linkwise._core import Model
     from linkwise.drives import Drive
 
-_FEW_ROWS = 100  # up to here a look takes a millisecond or less
-#: Poses of a run that are looked at besides its start: spread over the samples, and at peaks.
-_POSES = 8
-_PEAKS = 8
 _MOST_NAMED = 8
 _ELEMENT = "joint_load"
 
 
-def _rows(model: Model) -> int:
-    return sum(6 - freedom for freedom in model.loop_nv) + len(model.coupling_names)
-
-
 def is_looked_at(model: Model) -> bool:
     """Whether its loads may be open, and it is small enough to find out which are."""
-    return 0 < _rows(model) <= MOST_ROWS
+    return 0 < loop_rows(model) <= MOST_ROWS
 
 
 class Determinacy:
@@ -49,19 +40,12 @@ class Determinacy:
         self, model: Model, drives: Mapping[str, Drive], q: AnyArray, samples: int
     ) -> None:
         self._model = model
-        # Joints that are held still or moved as given hold a direction more. Those that close loops
-        # cannot be prescribed, and are looked at as if they were free.
-        of_tree = set(model.joint_names)
-        given = [
-            name
-            for name, drive in drives.items()
-            if isinstance(drive, (Locked, Motion)) and name in of_tree
-        ]
-        self._held = model.prescribe(given) if given else model
-        small = _rows(model) <= _FEW_ROWS
-        poses = min(samples, _POSES if small else 2)
+        given = [name for name, drive in drives.items() if isinstance(drive, Locked | Motion)]
+        self._held = Held(model, given)
+        small = loop_rows(model) <= FEW_ROWS
+        poses = min(samples, POSES if small else 2)
         self._wanted = {round(k) for k in np.linspace(0, samples - 1, poses)}
-        self._peaks = _PEAKS if small else 0
+        self._peaks = PEAKS if small else 0
         self._seen = 0
         self._open = np.zeros((model.n_joints + model.n_loops, len(COMPONENTS)), dtype=np.int64)
         self._count = 0
@@ -78,7 +62,7 @@ class Determinacy:
         if not np.isfinite(q).all():
             return
         try:
-            found = _core.indeterminacy(self._held, q)
+            found = self._held.indeterminacy(q)
         except InputError:  # of a run that went astray: its loops are open
             return
         self._count += 1
@@ -135,7 +119,7 @@ def _listed(names: list[str], mask: AnyArray) -> str:
 
 def not_looked_at(models: Iterable[Model]) -> list[Ignored]:
     """What is said of machines that are too large to be looked at."""
-    if all(_rows(model) <= MOST_ROWS for model in models):
+    if all(loop_rows(model) <= MOST_ROWS for model in models):
         return []
     return [
         Ignored(
