@@ -84,6 +84,30 @@ def test_starts_in_a_singular_position_take_the_branch_of_their_rates(n):
     assert np.ptp(energy) < 1e-5
 
 
+@pytest.mark.parametrize("integrator", ["auto", "runge_kutta_8"])
+def test_motions_that_contradict_each_other_later_are_named(integrator):
+    """Both rods of a four-bar turn alike until 0.1 s."""
+    start = benchmark("four_bars", n=1)
+
+    def apart(t):
+        late = max(t - 0.1, 0)
+        return -t + 3 * late**4, -1 + 12 * late**3, 36 * late**2
+
+    drives = {"A0": lw.Motion(lambda t: (-t, -1, 0)), "A1": lw.Motion(apart)}
+    run = lw.simulate(
+        start.model,
+        duration=1,
+        q0=start.q0,
+        v0=start.v0,
+        drives=drives,
+        integrator=integrator,
+        on_failure="return",
+    )
+    assert run.outcome == "singular_position"
+    assert 0.1 <= run.attrs["stop_time"] < 0.11
+    assert "motions of 'A0' and 'A1' contradict each other" in run.attrs["message"]
+
+
 def test_a_bricard_mechanism_falls():
     """A04; the reference was computed in another program, by other equations, to 8 digits."""
     start = benchmark("bricard")

@@ -105,13 +105,17 @@ class Closing {
   std::vector<double> du_, step_;
 };
 
+double openness(const LoopState& loop, bool of_rates) {
+  const LoopMiss miss = miss_of(loop, of_rates ? loop.slip : loop.gap);
+  return miss.shift / loop.length + miss.turn;
+}
+
 /// The loop that is open the widest.
 int widest(const Model& model, const LoopStates& states, bool of_rates) {
   int worst = 0;
   double largest = -1;
   for (int l = 0; l < model.n_loops(); ++l) {
-    const LoopMiss miss = miss_of(states[l], of_rates ? states[l].slip : states[l].gap);
-    const double size = miss.shift / states[l].length + miss.turn;
+    const double size = openness(states[l], of_rates);
     if (size > largest) {
       largest = size;
       worst = l;
@@ -120,9 +124,8 @@ int widest(const Model& model, const LoopStates& states, bool of_rates) {
   return worst;
 }
 
-/// "motions of 'a' and 'c' contradict each other through loop joint 'x'", of joints of given motion
-/// whose loops are one group with it; empty: there are none.
-std::string contradiction(const Model& model, const LoopStates& states, int l) {
+/// Of joints of given motion whose loops are one group with loop l.
+std::vector<std::string> given_in_loop(const Model& model, const LoopStates& states, int l) {
   std::vector<std::string> given;
   const auto add = [&](const JointInfo& joint, const std::vector<Element>& elements) {
     if (joint.n_elements > 0 && elements[joint.first_element].prescribed)
@@ -136,6 +139,12 @@ std::string contradiction(const Model& model, const LoopStates& states, int l) {
   for (const JointInfo& joint : model.joints)
     if (in_loop(joint.body)) add(joint, model.elements);
   add(model.loops.joints[l].joint, model.loops.elements);
+  return given;
+}
+
+/// Empty: no motion is given there.
+std::string contradiction(const Model& model, const LoopStates& states, int l) {
+  const std::vector<std::string> given = given_in_loop(model, states, l);
   if (given.empty()) return "";
   std::string text = given.size() == 1 ? "motion of " : "motions of ";
   for (size_t k = 0; k < given.size(); ++k)
@@ -203,14 +212,16 @@ void make_consistent(const Model& model, LoopProjection& loops, const std::vecto
   require_coupled(model, loops.states(), q.data(), v.data());
   const int l = widest(model, loops.states(), true);
   const LoopMiss miss = miss_of(loops.states()[l], loops.states()[l].slip);
-  const std::string given = contradiction(model, loops.states(), l);
-  throw InputError((given.empty()
-                        ? "joint '" + model.loops.joints[l].joint.name + "'" + model.where() +
-                              " closes a loop whose given motions "
-                              "contradict each other"
-                        : given) +
-                   ", by " + rounded(miss.shift) + " m/s and " + rounded(miss.turn) +
-                   " rad/s; drive one of them, or start where the machine can move");
+  const std::string given = contradiction(model, loops.states(), l),
+                    by =
+                        ", by " + rounded(miss.shift) + " m/s and " + rounded(miss.turn) + " rad/s";
+  if (!given.empty())
+    throw InputError(given + by + "; drive one of them, or start where the machine can move");
+  throw InputError(
+      "joint '" + model.loops.joints[l].joint.name + "'" + model.where() +
+      " opens: no rates near those of the start keep its loop closed" + by +
+      "; start at rest, or where the machine can move, and check that axes that should "
+      "be parallel are so to all digits");
 }
 
 }  // namespace
@@ -238,6 +249,18 @@ Assembly assemble(const Model& model, std::vector<double> q, std::vector<double>
     out.moved = changes(model, q, out.q);
     return out;
   }
+}
+
+std::string contradicting_motions(const Model& model, const LoopStates& states) {
+  std::string found;
+  double largest = -1;
+  for (int l = 0; l < model.n_loops(); ++l) {
+    const double size = openness(states[l], false) + openness(states[l], true);
+    if (!(size > largest) || given_in_loop(model, states, l).empty()) continue;
+    largest = size;
+    found = contradiction(model, states, l);
+  }
+  return found;
 }
 
 void require_assembled(const Model& model, const std::vector<double>& q,

@@ -28,4 +28,8 @@ Assembly assemble(const Model& model, std::vector<double> q, std::vector<double>
 void require_assembled(const Model& model, const std::vector<double>& q,
                        const std::vector<double>& v, const LoopMotion& given = {});
 
+/// "motions of 'a' and 'c' contradict each other through the loop that joint 'x' closes", of the
+/// loop that is open the widest among those with joints of given motion; empty: there is none.
+std::string contradicting_motions(const Model& model, const LoopStates& states);
+
 }  // namespace linkwise

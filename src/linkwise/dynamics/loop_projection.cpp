@@ -81,6 +81,8 @@ void LoopProjection::find_rank(const double* q) {
       best = report;
   }
   full_ = best.strong;
+  n_faint_ = best.rank - best.strong;
+  faintest_pivot_ = best.smallest_pivot;
   weakest_ = full_ < best.rank ? null : weak;
   faintest_ = std::max(weakest_, std::min(faint, 0.1 * best.smallest_pivot));
 }

@@ -33,6 +33,10 @@ class LoopProjection {
   /// The most of them is what they hold anywhere but in singular positions.
   void find_rank(const double* q);
   int full_rank() const { return full_; }
+  /// How many directions more are held there by next to nothing, and how much of the strongest that
+  /// is: axes that are parallel but for the digits that a file has, or masses that are very unlike.
+  int n_faint() const { return n_faint_; }
+  double faintest() const { return faintest_pivot_; }
   /// How many of them are lost at q itself, where the machine may move on in several ways. Of a
   /// long row of loops some may be missed.
   int lost_at_start() const { return std::max(0, full_ - at_start_); }
@@ -66,7 +70,8 @@ class LoopProjection {
   std::unique_ptr<ArticulatedLoops> recursion_;  ///< or
   std::unique_ptr<LoopedConstraintForce> graph_;
   std::vector<double> asked_;
-  int full_ = 0, at_start_ = 0;
+  int full_ = 0, at_start_ = 0, n_faint_ = 0;
+  double faintest_pivot_ = 1;
   double weakest_;   ///< directions that hold less are left alone
   double faintest_;  ///< and below this, as long as they are hardly open
   std::vector<double> du_, q_, v_;

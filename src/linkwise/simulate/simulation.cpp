@@ -223,6 +223,7 @@ Ending Simulation::failure(size_t member, double t, Outcome outcome, int body,
 
 /// A fixed step that is too long for a stiff machine ends in states that cannot be evaluated.
 std::string Simulation::described(Outcome outcome, int body) const {
+  if (outcome == Outcome::singular_position && loops_) return of_singular_position();
   const bool of_state = outcome == Outcome::not_finite || outcome == Outcome::not_positive_definite;
   if (!of_state || !find_integrator(setup_->options.integrator).fixed_step)
     return std::string(message(outcome)) + "; " + remedy_at(model(), outcome, body);

@@ -157,6 +157,7 @@ class Simulation : private OdeSystem {
                    double* drive);
   Outcome judge(double t, const DynamicsReport& report, const double* du, int n);
   std::string described(Outcome outcome, int body = -1) const;
+  std::string of_singular_position() const;
   Ending failure(size_t member, double t, Outcome outcome, int body, const double* du) const;
 
   void to_state(double* y) const;

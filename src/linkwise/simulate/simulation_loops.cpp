@@ -100,6 +100,30 @@ Outcome Simulation::steer_sample(double t, Outcome outcome) {
   return outcome;
 }
 
+/// What the loops cannot follow, and why.
+std::string Simulation::of_singular_position() const {
+  const Outcome outcome = Outcome::singular_position;
+  std::ostringstream text;
+  const std::string motions = contradicting_motions(setup_->driven(), loops_->states());
+  if (!motions.empty()) {
+    text << motions
+         << " from here on, or the machine is in a singular position that they do not lead out of; "
+            "give motions that its loops can follow, or drive fewer of these joints";
+    return text.str();
+  }
+  text << message(outcome);
+  if (loops_->n_faint() > 0)
+    text << ": " << loops_->n_faint() << " directions that its loops hold are held by only "
+         << std::setprecision(1) << std::sqrt(loops_->faintest())
+         << " of the others, as by axes that are parallel or points that meet but for the digits "
+            "of the file; write them to all digits, or let a joint of each such loop turn or slide "
+            "freely. Otherwise "
+         << remedy(outcome);
+  else
+    text << "; " << remedy(outcome);
+  return text.str();
+}
+
 std::string Simulation::loop_doubt() const {
   if (!loops_ || std::isnan(coasting_.passed())) return {};
   std::ostringstream text;

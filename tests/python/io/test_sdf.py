@@ -348,5 +348,16 @@ def test_cassie_stands_on_closed_loops(path):
     np.testing.assert_allclose(np.linalg.norm(fall), 9.81, rtol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore::linkwise.ModelWarning")
+def test_loops_that_hold_by_rounded_angles_say_so():
+    """Its links are turned by 1.5708, so that hinges which should be parallel are 4e-6 off."""
+    model = lw.load(next(path for path in CASSIE if path.endswith("cassie.sdf")))
+    with pytest.raises(lw.SimulationError, match="but for the digits of the file"):
+        lw.simulate(model, duration=0.2)
+    v0 = 0.1 * np.cos(np.arange(model.nv))
+    with pytest.raises(lw.InputError, match="no rates near those of the start"):
+        lw.simulate(model, duration=0.2, v0=v0)
+
+
 def test_there_are_files_of_cassie():
     assert len(CASSIE) >= 3
