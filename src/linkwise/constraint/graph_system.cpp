@@ -159,6 +159,8 @@ void GraphSystem::assemble(const SweepInput<double>& in, const double* asked) {
   for (int n = 0; n < model.n_bodies(); ++n) g_[n] = {-state_[n].bias.lin, -state_[n].bias.ang};
   apply_torques(in.tau);
   apply_loop_torques(in);
+  asked_ = r_;
+  given_ground_ = ground_;
   finish_b();
 }
 
@@ -415,14 +417,16 @@ void GraphSystem::calc_torques_missed(const SweepInput<double>& in, const std::v
 void GraphSystem::assemble_rest(const SweepInput<double>& in, const std::vector<double>& f,
                                 const double* du) {
   const Model& model = *model_;
+  ground_ = given_ground_;
   calc_motion(du);
   calc_torques_missed(in, f, du);
   // What is left of the rows of loops and couplings; those of the tree hold.
   for (int i = 0; i < A_.n(); ++i)
     for (int r = A_.offset[i]; r < A_.offset[i + 1]; ++r) {
       const bool of_tree = i < model.n_bodies();
-      r_[r] = of_tree ? 0 : r_[r] - A_.own[r] * f[r] - row_of_accelerations(i, r);
+      r_[r] = of_tree ? 0 : asked_[r] - A_.own[r] * f[r] - row_of_accelerations(i, r);
     }
+  calc_rest();
   for (int n = 0; n < model.n_bodies(); ++n)
     for (int r = 0; r < joint_[n].rows; ++r)
       if (const int v = joint_[n].armature_of[r]; v >= 0)
@@ -433,6 +437,18 @@ void GraphSystem::assemble_rest(const SweepInput<double>& in, const std::vector<
   apply_torques(tau_.data());
   std::fill(size_.begin(), size_.end(), 0.0);
   finish_b();
+}
+
+void GraphSystem::calc_rest() {
+  double torque = 0, load = 0, open = 0, largest = 0;
+  for (const double x : tau_) torque = std::max(torque, std::abs(x));
+  for (const Force<double>& w : w_)
+    for (const double x : to_array(w)) load = std::max(load, std::abs(x));
+  for (int r = A_.offset[model_->n_bodies()]; r < A_.size(); ++r)
+    if (A_.own[r] == 0) open = std::max(open, std::abs(r_[r]));
+  for (const Motion<double>& a : a_)
+    for (const double x : to_array(a)) largest = std::max(largest, std::abs(x));
+  rest_ = std::max(load > 0 ? torque / load : torque, largest > 0 ? open / largest : open);
 }
 
 void GraphSystem::add_rest(const SweepInput<double>& in, const std::vector<double>& df,

@@ -43,10 +43,13 @@ class GraphSystem {
                double* loads);
   /// By what part of the largest acceleration those that recover() found miss the constraints.
   double violation() const { return violation_; }
+  /// What assemble_rest() found missing: of torques and forces over the largest that a joint
+  /// transmits, of accelerations over the largest one.
+  double rest() const { return rest_; }
 
   /// Refinement: b of what f and du miss. The joints of the tree hold exactly with accelerations
   /// that follow from du; missed are torques, by Newton and Euler, and what loops and couplings
-  /// ask for.
+  /// ask for. After recover(), and again after add_rest().
   void assemble_rest(const SweepInput<double>& in, const std::vector<double>& f, const double* du);
   /// Adds the answer df of that system to f, du and loads.
   void add_rest(const SweepInput<double>& in, const std::vector<double>& df, std::vector<double>& f,
@@ -76,6 +79,7 @@ class GraphSystem {
   /// Of joint n of the tree.
   Vector6<double> relative_acceleration(int n) const;
   void calc_violation();
+  void calc_rest();
   double row_of_accelerations(int i, int r) const;
   void calc_motion(const double* du);
   void calc_torques_missed(const SweepInput<double>& in, const std::vector<double>& f,
@@ -85,6 +89,7 @@ class GraphSystem {
   const Model* model_;
   BlockGraph A_;
   std::vector<double> b_, r_, size_;
+  std::vector<double> asked_;  ///< r as assembled
   std::vector<Compliance<double>> compliance_;
   std::vector<BodyState<double>> state_;
   std::vector<GeneralState<double>> general_;
@@ -92,14 +97,14 @@ class GraphSystem {
   LoopStates loops_;
   std::vector<std::vector<int>> columns_;    ///< by coupling and term: of its joint's P, or -1
   std::vector<std::vector<double>> slopes_;  ///< the same: p' at the state
-  Motion<double> ground_;                    ///< acceleration of the ground
-  bool with_bias_ = true;                    ///< do velocities count?
-  std::vector<Force<double>> g_;             ///< known wrenches on bodies
+  Motion<double> ground_, given_ground_;  ///< its acceleration: of the system at hand, as assembled
+  bool with_bias_ = true;                 ///< do velocities count?
+  std::vector<Force<double>> g_;          ///< known wrenches on bodies
   std::vector<Force<double>> known_, known_of_loop_;  ///< what joints transmit of torques
   std::vector<Force<double>> w_, loop_w_;             ///< what they transmit
   std::vector<Motion<double>> a_;
   std::vector<double> tau_;
-  double violation_ = 0;
+  double violation_ = 0, rest_ = 0;
 };
 
 }  // namespace linkwise

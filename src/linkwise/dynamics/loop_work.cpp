@@ -49,9 +49,23 @@ double recursion_work(const Model& model) {
   return work;
 }
 
-double graph_work(const Model& model) {
+/// The joints of one body are all coupled, so the factor takes at least that of the largest body.
+double least_graph_work(const BlockGraph& graph) {
+  double most = 0;
+  for (int k = 0; k < graph.n_hubs(); ++k) {
+    double rows = 0;
+    for (int e = graph.hub_begin[k]; e < graph.hub_begin[k + 1]; ++e)
+      rows += graph.dim(graph.end_node[e]);
+    most = std::max(most, rows * rows * rows / 6);
+  }
+  return most;
+}
+
+/// Or less than that where it is `too_much` in any case.
+double graph_work(const Model& model, double too_much) {
   if (!refusal_of_graph(model).empty()) return std::numeric_limits<double>::infinity();
   const BlockGraph graph = make_constraint_graph(model);
+  if (const double least = least_graph_work(graph); least > too_much) return least;
   return work_of(graph, elimination_order(graph)) + per_node * graph.n();
 }
 
@@ -60,8 +74,8 @@ double graph_work(const Model& model) {
 LoopWork count_loop_work(const Model& model) {
   LoopWork work;
   work.recursion = recursion_work(model);
-  work.graph =
-      work.recursion > worth_counting ? graph_work(model) : std::numeric_limits<double>::infinity();
+  work.graph = work.recursion > worth_counting ? graph_work(model, work.recursion)
+                                               : std::numeric_limits<double>::infinity();
   return work;
 }
 

@@ -10,7 +10,8 @@ struct LoopWork {
   /// is left where they meet.
   double recursion = 0;
   /// Of A f = b of all joints (LoopedConstraintForce); counted only where the recursion has so much
-  /// to do that it may matter. Infinite where it does not take the machine.
+  /// to do that it may matter, and as far as it may be less. Infinite where it does not take the
+  /// machine.
   double graph = 0;
   /// Is the graph worth it? It assembles more, so only where it saves more than half.
   bool prefers_graph() const { return 2 * graph < recursion; }

@@ -15,6 +15,11 @@ constexpr double null_pivot = 1e-10;
 /// A gap makes dependent constraints independent, by pivots of the order of its square.
 double null_for(double gap) { return std::clamp(100 * gap * gap, null_pivot, 1e-4); }
 
+/// Changes of f below the first are good enough to end a refinement, above the second they are no
+/// answer.
+constexpr double fine = 1e-9, rough = 1e-6;
+constexpr int most_refinements = 5;
+
 }  // namespace
 
 LoopedConstraintForce::LoopedConstraintForce(const Model& model, const DynamicsOptions& options)
@@ -81,16 +86,53 @@ DynamicsReport LoopedConstraintForce::evaluate(double, const SweepInput<double>&
   report.loops = loops_;
   if (loops_.is_contradictory()) report.outcome = Outcome::singular_position;
   system_.recover(in, f_, du, loads);
-  if (factor_ && report.ok() && system_.violation() > acceptable_violation)
-    refine(in, du, loads, least);
+  if (factor_ && report.ok() && !refine(in, du, loads, least)) report.outcome = Outcome::stagnated;
   if (loads) system_.coupling_loads(f_, coupling_load_);
   return report;
 }
 
-void LoopedConstraintForce::refine(const SweepInput<double>& in, double* du, double* loads,
+/// Where Newton and Euler find anything missing. Once, as a rule; where masses are very unlike the
+/// forces themselves are rough, and it is repeated. What makes it no better, because rounding along
+/// the tree is all that is missing, is taken back. False where the forces remain rough.
+bool LoopedConstraintForce::refine(const SweepInput<double>& in, double* du, double* loads,
                                    bool least) {
   system_.assemble_rest(in, f_, du);
-  if (solve(system_.b(), df_, least).ok()) system_.add_rest(in, df_, f_, du, loads);
+  double rest = system_.rest(), change = 0;
+  if (std::max(system_.violation(), rest) <= acceptable_violation) return true;
+  const size_t n_loads = loads ? 6 * static_cast<size_t>(model_->n_loads()) : 0;
+  for (int step = 0; step < most_refinements; ++step) {
+    if (!solve(system_.b(), df_, least).ok()) return false;
+    before_.f = f_;
+    before_.du.assign(du, du + model_->nv());
+    before_.loads.assign(loads, loads + n_loads);
+    system_.add_rest(in, df_, f_, du, loads);
+    change = relative_change();
+    system_.assemble_rest(in, f_, du);
+    if (!(system_.rest() < 0.5 * rest)) {
+      f_ = before_.f;
+      std::copy(before_.du.begin(), before_.du.end(), du);
+      std::copy(before_.loads.begin(), before_.loads.end(), loads);
+      break;
+    }
+    rest = system_.rest();
+    if (change <= fine) break;
+  }
+  return change < rough;
+}
+
+/// Of the last refinement, the larger one of that of f as it is and of f where D_A is 1.
+double LoopedConstraintForce::relative_change() const {
+  const BlockGraph& A = system_.A();
+  double change = 0, size = 0, scaled_change = 0, scaled_size = 0;
+  for (int i = 0; i < A.n(); ++i)
+    for (int r = 0; r < A.dim(i); ++r) {
+      const double df = std::abs(df_[A.offset[i] + r]), f = std::abs(f_[A.offset[i] + r]);
+      change = std::max(change, df);
+      size = std::max(size, f);
+      scaled_change = std::max(scaled_change, df / factor_->scale(i, r));
+      scaled_size = std::max(scaled_size, f / factor_->scale(i, r));
+    }
+  return size > 0 ? std::max(change / size, scaled_change / scaled_size) : 0;
 }
 
 bool LoopedConstraintForce::respond(const double* q, const double* asked, double* du) {

@@ -31,7 +31,8 @@ class LoopedConstraintForce : public DynamicsMethod {
 
  private:
   Report solve(const std::vector<double>& b, std::vector<double>& x, bool least);
-  void refine(const SweepInput<double>& in, double* du, double* loads, bool least);
+  bool refine(const SweepInput<double>& in, double* du, double* loads, bool least);
+  double relative_change() const;
   void describe(double missed);
 
   const Model* model_;
@@ -41,6 +42,9 @@ class LoopedConstraintForce : public DynamicsMethod {
   LoopReport loops_;
   int rows_ = 0;  ///< that loops and couplings hold
   double missed_ = 0;
+  struct {
+    std::vector<double> f, du, loads;
+  } before_;  ///< a refinement
   std::vector<double> f_, df_, coupling_load_, at_rest_;
 };
 

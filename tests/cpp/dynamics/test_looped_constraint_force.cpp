@@ -12,6 +12,7 @@
 #include "dynamics/looped_machine.hpp"
 #include "linkwise/dynamics/articulated_loops.hpp"
 #include "linkwise/dynamics/indeterminacy.hpp"
+#include "linkwise/dynamics/loop_work.hpp"
 #include "linkwise/dynamics/looped_constraint_force.hpp"
 
 namespace linkwise::testing {
@@ -207,6 +208,58 @@ TEST(LoopedConstraintForce, LoadsDoNotDependOnTheJointThatClosesTheLoop) {
   }
   for (size_t i = 0; i < of_ring[0].size(); ++i)
     EXPECT_NEAR(of_ring[0][i], of_ring[1][i], 1e-6 * largest(of_ring[0])) << i;
+}
+
+// Light bodies between heavy ones take the digits of A. What comes out is right, or refused.
+TEST(LoopedConstraintForce, BodiesOfUnlikeMassAreRightOrRefused) {
+  int right = 0;
+  for (const double light : {1e-3, 1e-6, 1e-9, 1e-12, 1e-15}) {
+    SCOPED_TRACE(light);
+    Draws draws(8);
+    const std::vector<JointType> types(9, JointType::revolute);
+    ModelSpec spec = tree_spec(types, random_parents(9, draws), draws);
+    for (size_t i = 3; i < spec.links.size(); i += 2) {
+      spec.links[i].mass *= light;
+      for (double& x : spec.links[i].inertia.m) x *= light;
+    }
+    LoopedMachine machine(spec, draws);
+    machine.close(JointType::spherical, -1, 8, draws);
+    machine.make_consistent();
+    const Inputs given(machine, 2);
+    std::vector<double> want(machine.model.nv()), loads(6 * machine.model.n_loads()), du = want,
+                                                                                      got = loads;
+    ArticulatedLoops recursion(machine.model);
+    ASSERT_TRUE(recursion.evaluate(given.in, want.data(), loads.data()));
+    LoopedConstraintForce method(machine.model, by("thomas"));
+    if (!method.evaluate(0, given.in, du.data(), got.data()).ok()) continue;
+    ++right;
+    std::vector<double> external = given.c.external;
+    const LoopJoint& loop = machine.model.loops.joints[0];
+    const Force<double> w =
+        transpose_times(loop.joint.to_user, to_force(&got[6 * machine.model.n_joints()]));
+    machine.push(loop.joint.body, wrench_on_b(loop, w), external);
+    const auto balance =
+        WorldTwin(machine.tree).inverse_dynamics(machine.q, machine.v, du, external);
+    for (size_t i = 0; i < du.size(); ++i) {
+      EXPECT_NEAR(du[i], want[i], 1e-7 * largest(want)) << i;
+      EXPECT_NEAR(balance.tau[i], given.c.tau[i], 1e-9 * largest(got)) << i;
+    }
+    for (size_t i = 0; i < balance.loads.size(); ++i)
+      EXPECT_NEAR(got[i], balance.loads[i], 1e-9 * largest(got)) << i;
+  }
+  EXPECT_GE(right, 4);
+}
+
+// A row of four-bars on a floating body: one dense matrix of all pins for the graph, a band for the
+// recursion. The order of elimination, which would take long, is not even looked for.
+TEST(LoopWork, BodiesWithManyJointsAreLeftToTheRecursion) {
+  ModelSpec spec = row_of_four_bars(20000);
+  spec.links[0] = {"base", 1, {}, {{1, 0, 1, 0, 0, 1}}};
+  spec.floating_base = true;
+  const LoopWork work = count_loop_work(Model(spec));
+  EXPECT_FALSE(work.prefers_graph());
+  EXPECT_GT(work.graph, 1e13);
+  EXPECT_LT(work.recursion, 1e9);
 }
 
 TEST(LoopedConstraintForce, RefusesWhatItDoesNotTake) {
