@@ -113,6 +113,7 @@ METHODS = {
     "child_point:vector",
     "with_spring": "*name:text *parent:link *child:link *length:number point:vector "
     "child_point:vector stiffness:number damping:number",
+    "with_bearing": "*joint radial:number axial:number tilt:number torsion:number axis:vector",
     "with_coupling": "*name:text *factors offset:number",
     "with_loop": "*name:text *type:kind *parent:link *child:link translation:vector rotation "
     "child_translation:vector child_rotation:rotation axis:vector pitch:number",

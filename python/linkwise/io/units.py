@@ -63,6 +63,7 @@ UNITS: dict[str, Unit] = {
     "Nmm": Unit("moment", 1e-3),
     "N/m": Unit("stiffness", 1.0),
     "N/mm": Unit("stiffness", 1e3),
+    "N/um": Unit("stiffness", 1e6),
     "Nm/rad": Unit("angular stiffness", 1.0),
     "Nm/deg": Unit("angular stiffness", 1 / _DEG),
     "Ns/m": Unit("damping", 1.0),

@@ -166,8 +166,10 @@ def signal_of(
 
 
 def self_stresses(run: RunLike, model: Model) -> list[tuple[Array, Array]]:
-    """Poses (nq,) of a run and loads (n, joint, 6) of the self-stresses there: spread over its
-    samples, and where loads are largest, as those that `determinate` is of.
+    """Poses (nq,) of a run, and loads (n, joint, 6) of self-stresses that nothing decides there.
+
+    The poses are spread over its samples, and where loads are largest, as those that `determinate`
+    is of.
 
     None where loops are open, or the run does not hold all positions.
     """
@@ -188,7 +190,7 @@ def self_stresses(run: RunLike, model: Model) -> list[tuple[Array, Array]]:
     found = []
     for q in poses:
         with contextlib.suppress(InputError):  # of a run that went astray: its loops are open
-            found.append((q, np.asarray(machine.indeterminacy(q).self_stresses)))
+            found.append((q, np.asarray(machine.indeterminacy(q).undecided)))
     return found
 
 

@@ -501,6 +501,12 @@ def with_loops(source: ScenarioSource, model: Model) -> Model:
         except InputError as error:
             problem, _, remedy = str(error).partition("; ")
             source.complain(("coupling", name), problem, remedy or "correct it")
+    for joint, bearing in source.settings.bearing.items():
+        try:
+            model = model.with_bearing(joint, **bearing.model_dump(exclude_none=True))
+        except InputError as error:
+            problem, _, remedy = str(error).partition("; ")
+            source.complain(("bearing", joint), problem, remedy or "correct it")
     return model
 
 

@@ -362,6 +362,16 @@ class RodSection(Section):
     child_point: Point | None = None
 
 
+class BearingSection(Section):
+    """How stiff a joint is against the loads that it holds; rigid where nothing is given."""
+
+    radial: Annotated[float, _of("stiffness"), Field(gt=0)] | None = None
+    axial: Annotated[float, _of("stiffness"), Field(gt=0)] | None = None
+    tilt: Annotated[float, _of("angular stiffness"), Field(gt=0)] | None = None
+    torsion: Annotated[float, _of("angular stiffness"), Field(gt=0)] | None = None
+    axis: Direction | None = None
+
+
 class PointSpringSection(Section):
     """A spring and damper without mass between a ball on each of two links.
 
@@ -465,6 +475,7 @@ class ScenarioFile(Section):
     rod: dict[str, RodSection] = {}
     spring: dict[str, PointSpringSection] = {}
     coupling: dict[str, CouplingSection] = {}
+    bearing: dict[str, BearingSection] = {}
     rating: dict[str, RatingSection] = {}
     simulate: SimulateSection
     output: OutputSection = OutputSection()
@@ -494,6 +505,7 @@ _NAMED: dict[str, type[Section]] = {
     "rod": RodSection,
     "spring": PointSpringSection,
     "coupling": CouplingSection,
+    "bearing": BearingSection,
     "rating": RatingSection,
 }
 

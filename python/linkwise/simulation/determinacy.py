@@ -67,7 +67,7 @@ class Determinacy:
             return
         self._count += 1
         self._open += np.logical_not(found.determinate)
-        self._self_stresses = max(self._self_stresses, found.rows - found.rank)
+        self._self_stresses = max(self._self_stresses, len(found.undecided))
 
     def see(self, positions: AnyArray) -> None:
         """The next samples (time, nq); a few of all are looked at."""
@@ -102,7 +102,8 @@ class Determinacy:
             f"rigid bodies do not determine {', and '.join(parts)}: {count} "
             f"self-stress{'es' if count > 1 else ''} of the closed loops load "
             "them by any amount, and what is shown is one choice of many; do not size parts by "
-            "it, or leave a joint of the loop more freedom (a spherical or cylindrical one)"
+            "it, but say how stiff its bearings are ([bearing.JOINT], with_bearing), or leave "
+            "a joint of the loop more freedom (a spherical or cylindrical one)"
         )
         return [Ignored("", _ELEMENT, text)]
 

@@ -11,6 +11,7 @@
 #include <memory>
 #include <vector>
 
+#include "linkwise/dynamics/bearing_shares.hpp"
 #include "linkwise/dynamics/loop_groups.hpp"
 #include "linkwise/dynamics/loop_report.hpp"
 #include "linkwise/dynamics/loop_system.hpp"
@@ -48,6 +49,11 @@ class ArticulatedLoops {
   }
   /// Joint loads [n_loads][6] of self-stress k, found before.
   void self_stress(int group, int k, const double* q, double* loads) const;
+  /// Self-stresses of a group that no bearing decides: joint loads [n][n_loads][6], one after the
+  /// other behind `loads`.
+  void append_undecided(int group, const double* q, std::vector<double>& loads);
+  /// How far the longest loop reaches, m; 1 where there is none.
+  double longest_loop() const;
 
  private:
   struct Work {
@@ -70,6 +76,10 @@ class ArticulatedLoops {
   void add_coupling_to_load(const LoopGroup::Member& member, double f,
                             std::vector<Force<double>>& load) const;
   void store_loop_load(int l, const Force<double>& w, double* loads) const;
+  void make_bearing_shares();
+  void store_stress(int g, const double* f, const double* q, double* loads) const;
+  int find_stresses(int g, const double* q);
+  void share_by_bearings(int g, const double* q, double* loads);
 
   const Model& model_;
   TreeSweeps<double> sweeps_;
@@ -87,6 +97,8 @@ class ArticulatedLoops {
   std::vector<Compliance<double>> compliance_a_, compliance_b_;  ///< by loop
   std::vector<std::vector<int>> terms_;  ///< by coupling: columns of its joints, -1: given motion
   std::vector<Force<double>> load_;
+  std::vector<BearingShares> shares_;  ///< by group, where the model has bearings
+  std::vector<double> null_forces_, stresses_, alpha_;
   LoopReport report_;
   const double* asked_ = nullptr;  ///< in place of what rates ask for
   double null_ = 0;                ///< pivots of the scaled Lambda below this are zero

@@ -183,6 +183,11 @@ std::string rounded(double x) {
 }
 
 void choose_for_loops(const Model& model, Choice& choice) {
+  if (!model.bearings.empty()) {
+    choice.method = "articulated_body";
+    choice.reason = "closed loops, whose bearings share loads in the recursion alone";
+    return;
+  }
   const LoopWork work = count_loop_work(model);
   choice.method = work.prefers_graph() ? "constraint_force" : "articulated_body";
   if (work.prefers_graph())
@@ -237,7 +242,13 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
     choice.solver = "";
   else if (choice.solver == "auto")
     choice.solver = "thomas";
-  if (entry.uses_solver && model.is_constrained()) require_solver_of_loops(choice.solver);
+  if (entry.uses_solver && model.is_constrained()) {
+    require_solver_of_loops(choice.solver);
+    if (!model.bearings.empty())
+      throw InputError("method " + choice.method +
+                       " shares no loads among bearings; use method articulated_body, or remove "
+                       "the bearings");
+  }
   return choice;
 }
 

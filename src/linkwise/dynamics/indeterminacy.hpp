@@ -2,7 +2,7 @@
 // Which joint loads rigid bodies determine. Constraints that repeat each other let forces through
 // that cancel inside the loops and move nothing: self-stresses, the null vectors N of Lambda. Any
 // multiple may be added to the loads [wojtyra2005]. A component that no self-stress touches is
-// determinate: no choice of forces changes it.
+// determinate: no choice of forces changes it. So is one whose self-stresses bearings decide.
 #include <vector>
 
 #include "linkwise/model/model.hpp"
@@ -17,7 +17,12 @@ struct Indeterminacy {
   /// Joint loads of independent self-stresses, each with its largest force, or moment over the
   /// loops' length, 1: [n_self_stresses][n_loads][6], in the users' frames as joint loads are.
   std::vector<double> self_stresses;
+  /// Of those that no bearing decides, scaled alike: [n_undecided][n_loads][6]. All where the model
+  /// has no bearings.
+  int n_undecided = 0;
+  std::vector<double> undecided;
   std::vector<char> determinate;  ///< [n_loads][6]
+  std::vector<char> by_bearings;  ///< determinate, but not by rigid bodies alone
 };
 
 /// At position q, which must close the loops: InputError otherwise.

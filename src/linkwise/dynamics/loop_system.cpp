@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "linkwise/linear/pivoted_qr.hpp"
 #include "linkwise/simd/cholesky.hpp"
 
 namespace linkwise {
@@ -103,6 +104,17 @@ void LoopSystem::null_vector(int k, std::vector<double>& f) const {
   f.resize(profile_.size());
   exact_.null_vector(k, f.data());
   from_scaled(f.data());
+}
+
+int LoopSystem::null_basis(double null, std::vector<double>& f) {
+  if (!is_small()) factor_exactly(null);
+  const int n = n_null();
+  const auto rows = static_cast<size_t>(profile_.size());
+  f.resize(n * rows);
+  for (int k = 0; k < n; ++k) exact_.null_vector(k, &f[k * rows]);
+  orthonormalise(profile_.size(), f);
+  for (int k = 0; k < n; ++k) from_scaled(&f[k * rows]);
+  return n;
 }
 
 void LoopSystem::to_scaled(double* x) const {

@@ -41,6 +41,8 @@ class LoopSystem {
   void factor_exactly(double null = 1e-10);
   int n_null() const { return exact_.size() - exact_.rank(); }
   void null_vector(int k, std::vector<double>& f) const;
+  /// Null vectors [n][rows] of the last factor, f^T D f = 1 and 0 between them. Returns n.
+  int null_basis(double null, std::vector<double>& f);
 
  private:
   bool is_small() const { return profile_.size() <= 64; }

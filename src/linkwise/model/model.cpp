@@ -4,6 +4,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/model/hinge_frames.hpp"
+#include "linkwise/model/place_bearings.hpp"
 #include "linkwise/model/place_couplings.hpp"
 #include "linkwise/model/place_loops.hpp"
 #include "linkwise/model/undetermined.hpp"
@@ -69,6 +70,7 @@ Model::Model(ModelSpec given) : spec_(std::move(given)) {
         std::any_of(dof_values(p).begin(), dof_values(p).end(), [](double x) { return x > 0; });
   for (const std::string& name : spec_.prescribed) load_index(name);
   couplings = place_couplings(*this);
+  bearings = place_bearings(*this, notes);
 }
 
 int Model::load_index(const std::string& name) const {

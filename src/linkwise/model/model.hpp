@@ -128,6 +128,14 @@ struct Coupling {
   double offset = 0;
 };
 
+/// What a joint yields to its load, in the user's joint frame.
+struct Bearing {
+  int load;                 ///< row of the joint's load
+  Vec3<double> axis;        ///< of unit length
+  double across, along;     ///< m/N, to a force; 0: rigid
+  double tilting, turning;  ///< rad/(N m), to a moment across and about the axis
+};
+
 /// Where a link of the file is: on which joint's frame (-1: ground), and how it is placed there.
 struct LinkInfo {
   std::string name;
@@ -195,6 +203,7 @@ class Model {
   std::vector<LinkInfo> links;
   LoopJoints loops;
   std::vector<Coupling> couplings;
+  std::vector<Bearing> bearings;
   std::vector<Note> notes;
   /// One array of length nv for each property of dof_property_table.
   std::array<std::vector<double>, n_dof_properties> dof;

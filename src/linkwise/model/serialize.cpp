@@ -14,13 +14,15 @@ namespace {
 
 // Machines without loops are described as they always were, where what is as usual may be left out
 // at the end. Others are described in full, so that bytes cut short are no other machine.
-constexpr char magic[] = "linkwise-model-1", magic_in_full[] = "linkwise-model-2";
+// So are those with bearings, whose list stands last.
+constexpr const char* magics[] = {"linkwise-model-1", "linkwise-model-2", "linkwise-model-3"};
+constexpr int in_full = 1, with_bearings = 2;
 
 struct Writer {
   std::string bytes;
-  bool in_full;
+  int extent;
 
-  explicit Writer(bool full) : bytes(full ? magic_in_full : magic), in_full(full) {}
+  explicit Writer(int of) : bytes(magics[of]), extent(of) {}
 
   void raw(const void* data, size_t n) { bytes.append(static_cast<const char*>(data), n); }
   template <class E>
@@ -32,15 +34,15 @@ struct Writer {
     const std::uint64_t n = values.size();
     raw(&n, sizeof(n));
   }
-  bool goes_on(bool more) const { return more || in_full; }
+  bool goes_on(bool more) const { return more || extent >= in_full; }
 };
 
 struct Reader {
   const std::string& bytes;
-  bool in_full;
-  size_t at = sizeof(magic) - 1;
+  int extent;
+  size_t at = std::strlen(magics[0]);
 
-  Reader(const std::string& given, bool full) : bytes(given), in_full(full) {}
+  Reader(const std::string& given, int of) : bytes(given), extent(of) {}
 
   [[noreturn]] static void fail(const char* what) {
     throw InputError(std::string("model data is ") + what +
@@ -68,7 +70,7 @@ struct Reader {
     if (n > bytes.size() - at) fail("cut short");
     values.resize(n);
   }
-  bool goes_on(bool) const { return in_full || at < bytes.size(); }
+  bool goes_on(bool) const { return extent >= in_full || at < bytes.size(); }
 };
 
 template <class A, class Text>
@@ -141,7 +143,7 @@ void spec_fields(A& archive, Spec& spec) {
     archive.size(l.parameters);
     archive.raw(l.parameters.data(), l.parameters.size() * sizeof(double));
   }
-  if (!archive.in_full) return;
+  if (archive.extent < in_full) return;
   archive.size(spec.loop_joints);
   for (auto& loop : spec.loop_joints) {
     joint_fields(archive, loop.joint);
@@ -163,23 +165,33 @@ void spec_fields(A& archive, Spec& spec) {
     }
     archive.raw(&coupling.offset, sizeof(double));
   }
+  if (archive.extent < with_bearings) return;
+  archive.size(spec.bearings);
+  for (auto& bearing : spec.bearings) {
+    text(archive, bearing.joint);
+    for (auto* x : {&bearing.radial, &bearing.axial, &bearing.tilt, &bearing.torsion})
+      archive.raw(x, sizeof(double));
+    archive.raw(&bearing.axis.x, 3 * sizeof(double));
+  }
 }
 
 }  // namespace
 
 std::string serialize(const ModelSpec& spec) {
-  Writer writer(!spec.loop_joints.empty() || !spec.couplings.empty());
+  const bool loops = !spec.loop_joints.empty() || !spec.couplings.empty();
+  Writer writer(!spec.bearings.empty() ? with_bearings : loops ? in_full : 0);
   spec_fields(writer, spec);
   return std::move(writer.bytes);
 }
 
 ModelSpec deserialize(const std::string& bytes) {
-  const bool in_full = bytes.starts_with(magic_in_full);
-  if (!in_full && !bytes.starts_with(magic))
+  int extent = with_bearings;
+  while (extent >= 0 && !bytes.starts_with(magics[extent])) --extent;
+  if (extent < 0)
     throw InputError(
         "model data was not written by this version of linkwise; build the model again from its "
         "source");
-  Reader reader(bytes, in_full);
+  Reader reader(bytes, extent);
   ModelSpec spec;
   spec_fields(reader, spec);
   if (reader.at != bytes.size()) Reader::fail("damaged");

@@ -138,6 +138,16 @@ struct CouplingSpec {
   double offset = 0;
 };
 
+/// How much a joint yields to its load, on top of the motions that it leaves: stiffness across and
+/// along an axis in the joint's frame, against tilting the axis and against turning about it.
+/// It moves nothing, and decides what rigid bodies leave open: dynamics/bearing_shares.hpp.
+struct BearingSpec {
+  std::string joint;
+  double radial = infinity, axial = infinity;  ///< N/m
+  double tilt = infinity, torsion = infinity;  ///< N m/rad
+  Vec3<double> axis{};                         ///< 0: the joint's own
+};
+
 enum class NoteLevel { merge, warning, info };
 const char* note_level_name(NoteLevel level);
 NoteLevel note_level_from_name(const std::string& name);
@@ -158,6 +168,7 @@ struct ModelSpec {
   std::vector<JointSpec> joints;
   std::vector<LoopJointSpec> loop_joints;
   std::vector<CouplingSpec> couplings;
+  std::vector<BearingSpec> bearings;
   std::vector<Note> notes;  ///< of whoever read the model from a file
 };
 
