@@ -71,7 +71,7 @@ def test_four_bars_go_through_their_singular_positions(n, end, tolerance, within
     assert open_by(start.model, run) < 1e-10
 
 
-@pytest.mark.parametrize("n", [1, 40])
+@pytest.mark.parametrize("n", [1, 2, 13, 40])
 def test_starts_in_a_singular_position_take_the_branch_of_their_rates(n):
     model = benchmark("four_bars", n=n).model
     q0, v0 = state(model, A=-np.pi / 2, B=np.pi / 2), state(model, A=-3, B=3)
@@ -82,6 +82,23 @@ def test_starts_in_a_singular_position_take_the_branch_of_their_rates(n):
     assert np.abs(rods - rods[:, :1]).max() < 1e-9
     energy = (run.kinetic_energy + run.potential_energy).values
     assert np.ptp(energy) < 1e-5
+
+
+def test_long_steps_go_through_singular_positions_as_well():
+    """A02 by a method whose steps are several windows long."""
+    start = benchmark("four_bars", n=40)
+    for tolerance, within in ((1e-9, 1e-7), (1e-11, 2e-8)):
+        run = lw.simulate(
+            start.model,
+            duration=10,
+            every=10,
+            q0=start.q0,
+            v0=start.v0,
+            tolerance=tolerance,
+            integrator="runge_kutta_8",
+        )
+        found = tip(start.model, run, "A0", (0, 1, 0))[-1, :2]
+        assert np.abs(found - (0.1805122267, 0.9835727406)).max() < within
 
 
 @pytest.mark.parametrize("integrator", ["auto", "runge_kutta_8"])

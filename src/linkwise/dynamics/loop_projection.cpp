@@ -60,15 +60,18 @@ LoopReport LoopProjection::report_at(const double* q) {
   return report();
 }
 
-void LoopProjection::find_rank(const double* q) {
+void LoopProjection::find_rank(const double* q, const double* v) {
   LoopReport best = report_at(q);
   std::vector<double> other, aside(model_.nv());
   at_start_ = best.rank;
-  for (const double beside : {0.03, -0.03}) {  // rad, or m
+  double fastest = 0;
+  for (int i = 0; i < model_.nv() && v; ++i) fastest = std::max(fastest, std::abs(v[i]));
+  for (int way = 0; way < (fastest > 0 ? 4 : 2); ++way) {
+    const double beside = way % 2 == 0 ? 0.03 : -0.03;  // rad, or m
     other.assign(q, q + model_.nq());
     for (const Element& e : model_.elements)
-      for (int i = 0; i < e.nv && !e.prescribed; ++i)
-        aside[e.v + i] = beside * std::cos(2.4 * (e.v + i));
+      for (int i = e.v; i < e.v + e.nv && !e.prescribed; ++i)
+        aside[i] = beside * (way < 2 ? std::cos(2.4 * i) : v[i] / fastest);
     move_by(model_, aside.data(), other.data());
     for (int k = 0; k < 20 && gap(other.data()) > closed; ++k) {
       if (!close(other.data(), null, du_.data())) break;

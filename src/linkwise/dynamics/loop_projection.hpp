@@ -29,9 +29,10 @@ class LoopProjection {
   /// From now on, what loop joints of given motion are to follow.
   void give(const LoopMotion& given) { given_ = given; }
 
-  /// Looks how many directions the loops hold at q, which closes them, and at positions beside it.
-  /// The most of them is what they hold anywhere but in singular positions.
-  void find_rank(const double* q);
+  /// Looks how many directions the loops hold at q, which closes them, and at positions beside it,
+  /// those to which rates v lead among them (null: none). The most of them is what they hold
+  /// anywhere but in singular positions.
+  void find_rank(const double* q, const double* v = nullptr);
   int full_rank() const { return full_; }
   /// How many directions more are held there by next to nothing, and how much of the strongest that
   /// is: axes that are parallel but for the digits that a file has, or masses that are very unlike.

@@ -23,7 +23,7 @@ void Coasting::start(int full) {
 }
 
 Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, std::vector<double>& dv,
-                        bool remember) {
+                        bool remember, bool known) {
   if (outcome != Outcome::converged && outcome != Outcome::singular_position) return outcome;
   full_ = std::max(full_, loops.strong);
   const bool inside = loops.strong < full_;
@@ -33,8 +33,9 @@ Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, std:
     if (remembered_) last_ = {t, dv};
     last_pivot_ = {t, inside ? 0 : loops.smallest_pivot};
   }
-  if (!inside || known_.size() < fewest_points) return outcome;
+  if (!inside || (!known && known_.size() < fewest_points)) return outcome;
   if (steps_inside_ > most_steps_inside) return Outcome::singular_position;
+  if (known) return Outcome::converged;
   extrapolate(t, dv);
   return Outcome::converged;
 }
@@ -64,6 +65,11 @@ void Coasting::find_passage() {
   if (lowest < a.t || lowest > c.t) return;
   const double value = a.value + (lowest - a.t) * (first + bend * (lowest - b.t));
   if (value < 0.05 * std::min({a.value, b.value, c.value})) passed_ = lowest;
+}
+
+double Coasting::reaches_back(double t) const {
+  if (known_.size() < points) return std::numeric_limits<double>::infinity();
+  return steps_inside_ > most_steps_inside / 5 ? 0 : t - known_.front().t;
 }
 
 /// By Lagrange's polynomial.

@@ -3,7 +3,8 @@
 // elsewhere: a parallelogram stretched straight, for one. Its motion is smooth there, but what the
 // constraints demand is a difference of nearly equal numbers over the square of the distance, and
 // steps would become smaller without end. In a narrow window around such a position the
-// accelerations are those of the polynomial through the last ones before it.
+// accelerations are those of the polynomial through the last ones before it, or of one through
+// positions beside it where these are far apart: see Simulation::accelerate_from_beside().
 #include <deque>
 #include <vector>
 
@@ -18,9 +19,14 @@ class Coasting {
   void start(int full);
 
   /// Replaces the accelerations dv at time t where the loops are nearly singular, and returns what
-  /// becomes of the outcome. remember: of the integration itself.
+  /// becomes of the outcome. remember: of the integration itself; known: they are known already.
   Outcome steer(double t, const LoopReport& loops, Outcome outcome, std::vector<double>& dv,
-                bool remember);
+                bool remember, bool known = false);
+  /// Whether that holds.
+  bool is_near(const LoopReport& loops) const { return loops.strong < full_; }
+  /// How long ago the accelerations before begin, s; infinite: there are too few. 0 after some
+  /// steps inside: what is short enough for these will do.
+  double reaches_back(double t) const;
   /// The step that the last evaluation belongs to is accepted.
   void accepted();
 

@@ -150,7 +150,9 @@ class Simulation : private OdeSystem {
   void report_accepted() {
     if (observer_) observer_->accepted();
   }
-  Outcome steer(double t, Outcome outcome, double* dv, bool remember);
+  Outcome steer(double t, Outcome outcome, double* dv, bool remember, bool known);
+  bool accelerate_from_beside(DynamicsMethod* method, double t, const double* q, const double* v,
+                              double* du);
   Outcome steer_sample(double t, Outcome outcome);
   void evaluate_for(Extremes& extremes);
   bool evaluate_at(double t, const double* q, const double* v, double* du, double* loads,
