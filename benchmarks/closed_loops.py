@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -25,6 +24,7 @@ import numpy as np
 
 import linkwise as lw
 from benchmarks import study
+from benchmarks.timing import timed
 
 CASES = [
     *(("chain of hinges", n) for n in (1_000, 100_000)),
@@ -98,9 +98,7 @@ def shortest(calls: list[Callable[[], Any]], rounds: int) -> list[float]:
     best = [np.inf] * len(calls)
     for _ in range(rounds):
         for k, call in enumerate(calls):
-            start = time.perf_counter()
-            call()
-            best[k] = min(best[k], time.perf_counter() - start)
+            best[k] = min(best[k], timed(call)[1].seconds)
     return best
 
 

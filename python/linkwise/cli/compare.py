@@ -79,7 +79,7 @@ def _show(found: dict[str, Any]) -> None:
         f"A f = b has {unknowns} unknowns, condition {number(found['condition_estimate'], 3)}, "
         f"Jacobi's spectral radius {number(found['spectral_radius'], 6)}."
         if unknowns is not None
-        else f"No A f = b: {found['system_message']}."
+        else f"No condition of A f = b: {found['system_message']}."
     )
     screen.print(
         f"{text(found['model'])}, {found['bodies']} bodies, {found['degrees_of_freedom']} degrees "
@@ -116,7 +116,8 @@ def _show(found: dict[str, Any]) -> None:
     who: dict[str, dict[str, None]] = {}  # each message once, with all that it is about, in order
     for row in found["rows"]:
         if row["message"]:
-            who.setdefault(row["message"], {})[row["solver"] or row["method"]] = None
+            name = row["solver"] or row["method"]
+            who.setdefault(row["message"].removeprefix(f"solver '{name}' "), {})[name] = None
     for message, names in who.items():
         screen.print(f"{', '.join(names)}: {text(message)}", markup=False)
     say_warnings(found["warnings"])
