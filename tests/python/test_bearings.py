@@ -197,3 +197,42 @@ def test_the_graph_shares_nothing_among_bearings() -> None:
     model = door().with_bearing("upper", axial=1e8, axis=(0, 0, 1))
     with pytest.raises(lw.InputError, match="use method articulated_body"):
         loads(model, method="constraint_force")
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+@pytest.mark.parametrize(("radial", "tilt"), [(2e8, 1e4), (1e8, 5e7)])
+def test_hinges_share_a_moment_by_forces_and_by_tilt(
+    radial: float, tilt: float, scale: float
+) -> None:
+    """The line of the hinges turns by an angle: forces grow with 0.75 m of it, moments as well."""
+    model = door("revolute", scale=scale)
+    for joint in ("lower", "upper"):
+        units = {"axial": 1e8, "radial": radial, "tilt": tilt / scale**2}
+        model = model.with_bearing(joint, **units)
+    angle = 40 * G * 0.45 / (1.5 * 0.75 * radial + 2 * tilt)
+    found = loads(model)
+    for joint, sign in (("lower", 1), ("upper", -1)):
+        force, moment = found[joint][:3] * scale, found[joint][3:] * scale**2
+        np.testing.assert_allclose(force, [sign * 0.75 * radial * angle, 0, 20 * G], atol=1e-9)
+        np.testing.assert_allclose(moment, [0, -tilt * angle, 0], rtol=1e-9, atol=1e-9)
+
+
+def test_one_bearing_decides_the_self_stress_of_bricard() -> None:
+    """Its loads stay those of rigid bodies but for the self-stress, and its work is least."""
+    machine = lw.scenes.benchmark("bricard")
+    bare, q = machine.model, machine.q0
+    model = bare.with_bearing("P0", radial=1e8)
+    found = lw.indeterminacy(model, q)
+    assert (len(found.self_stresses), len(found.undecided)) == (1, 0)
+    assert found.determinate.all()
+    stress = found.self_stresses[0]
+    change = loads_at(model, q) - loads_at(bare, q)
+    share = np.vdot(change, stress) / np.vdot(stress, stress)
+    np.testing.assert_allclose(change, share * stress, atol=1e-12)
+    axis = np.asarray(bare.joint_axes[0][0][1])
+    across = stress[0, :3] - axis * (axis @ stress[0, :3])
+    np.testing.assert_allclose(across @ loads_at(model, q)[0, :3], 0, atol=1e-10)
+
+
+def loads_at(model: lw.Model, q: np.ndarray) -> np.ndarray:
+    return lw.joint_loads(model, q, np.zeros(model.nv), np.zeros(model.nv))

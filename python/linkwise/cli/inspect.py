@@ -129,10 +129,9 @@ def _mobility(model: Model) -> dict[str, int | None]:
     drawn, with how many loads are held more than once there; None where it does not close."""
     from linkwise._core import InputError, indeterminacy
 
-    rows = sum(6 - freedom for freedom in model.loop_nv)
-    counted = model.nv - rows - len(model.coupling_names)
+    rows = sum(6 - freedom for freedom in model.loop_nv) + len(model.coupling_names)
     found: dict[str, int | None] = {
-        "counted_mobility": counted,
+        "counted_mobility": model.nv - rows,
         "mobility": None,
         "self_stresses": None,
     }
@@ -165,13 +164,16 @@ def _headline(found: dict[str, Any]) -> str:
 
 def _said_of_loops(found: dict[str, Any]) -> str:
     loops, couplings = found["loops"], found["couplings"]
-    said = f"; {_plural(len(couplings), 'coupling')}" if couplings else ""
-    if not loops:
-        return said
-    joints = _plural(len(loops), "joint closes a loop", "joints close loops")
-    taken = sum(6 - loop["degrees_of_freedom"] for loop in loops) + len(couplings)
+    if not loops and not couplings:
+        return ""
+    tied = [_plural(len(couplings), "coupling")] if couplings else []
+    if loops:
+        tied.append(_plural(len(loops), "joint closes a loop", "joints close loops"))
     counted = found["counted_mobility"]
-    said += f"; {joints}: {found['nv']} - {taken} = {counted} degrees of freedom by counting"
+    taken = found["nv"] - counted
+    said = (
+        f"; {'; '.join(tied)}: {found['nv']} - {taken} = {counted} degrees of freedom by counting"
+    )
     if found["mobility"] is not None:
         said += f", {found['mobility']} as drawn"
     if found["self_stresses"]:

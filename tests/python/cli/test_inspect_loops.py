@@ -2,6 +2,23 @@
 
 from helpers.press_sdf import PRESS
 
+GEARS = """
+model = "wheels.urdf"
+[coupling.a]
+factors = { one = 1, two = 2 }
+[coupling.b]
+factors = { two = 1, three = 2 }
+[coupling.c]
+factors = { one = 1, three = -4 }
+[simulate]
+duration = 1
+"""
+WHEEL = (
+    '<link name="{0}_wheel"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
+    'ixz="0" iyz="0"/></inertial></link><joint name="{0}" type="continuous"><parent link="frame"/>'
+    '<child link="{0}_wheel"/><axis xyz="0 0 1"/></joint>'
+)
+
 
 def test_mobility_and_self_stresses(linkwise, tmp_path):
     """A slider-crank: planar, so that its loop holds the plane three times more than it must."""
@@ -13,3 +30,16 @@ def test_mobility_and_self_stresses(linkwise, tmp_path):
     shown = " ".join(linkwise("inspect", path).out.split())
     said = "1 joint closes a loop: 3 - 5 = -2 degrees of freedom by counting, 1 as drawn"
     assert f"{said}, with 3 self-stresses" in shown
+
+
+def test_wheels_that_are_geared_in_a_ring(linkwise, tmp_path):
+    """Three gears between three wheels, of which two would do."""
+    wheels = "".join(WHEEL.format(name) for name in ("one", "two", "three"))
+    urdf = f'<robot name="wheels"><link name="frame"/>{wheels}</robot>'
+    (tmp_path / "wheels.urdf").write_text(urdf)
+    (tmp_path / "gears.toml").write_text(GEARS)
+    found = linkwise("inspect", tmp_path / "gears.toml", "--json").json
+    assert (found["counted_mobility"], found["mobility"], found["self_stresses"]) == (0, 1, 1)
+    shown = " ".join(linkwise("inspect", tmp_path / "gears.toml").out.split())
+    said = "3 couplings: 3 - 3 = 0 degrees of freedom by counting, 1 as drawn, with 1 self-stress"
+    assert said in shown
