@@ -64,6 +64,7 @@ TEST(LoopWatch, SlopesBoundWhatErrorsOfTheTreeDo) {
     machine.close(type, -1, 8, draws);
     Watched at(machine);
     const Model& m = *at.model;
+    double largest = 0;
     for (int trial = 0; trial < 20; ++trial) {
       // A change that keeps the loops closed: of coordinates, and then of rates.
       LoopedMachine other = machine;
@@ -83,11 +84,12 @@ TEST(LoopWatch, SlopesBoundWhatErrorsOfTheTreeDo) {
             position += slope.position * std::abs(way[slope.of]);
             rate += slope.rate * std::abs(way[slope.of]);
           }
-          EXPECT_GT(rate, 0);
+          largest = std::max(largest, rate);
           EXPECT_LE(std::abs(found[m.loops.nq + e.v + k]), rate + 1e-6);
           if (has_scalar_coordinates(e)) EXPECT_LE(std::abs(found[e.q + k]), position + 1e-6);
         }
     }
+    EXPECT_GT(largest, 0.1);
   }
 }
 
