@@ -18,18 +18,6 @@ constexpr double null_pivot = 1e-10;
 /// Of a group with bearings: a dense factor of more takes seconds a state.
 constexpr int most_rows = 1000;
 
-/// The widest gap, or slip, over its loop's length.
-double widest(const LoopStates& states, int n_loops, bool of_rates) {
-  double widest = 0;
-  for (int l = 0; l < n_loops; ++l) {
-    const LoopState& loop = states[l];
-    const LoopMiss miss = miss_of(loop, of_rates ? loop.slip : loop.gap);
-    const double size = loop.length + (of_rates ? loop.speed : 0);
-    widest = std::max(widest, (miss.shift + miss.turn * loop.length) / size);
-  }
-  return widest;
-}
-
 /// Part of a list of ranges: bodies [begin, end).
 std::vector<KindRange> part_of(const std::vector<KindRange>& all, int begin, int end) {
   std::vector<KindRange> part;
@@ -145,8 +133,7 @@ bool ArticulatedLoops::evaluate(const SweepInput<double>& in, double* du, double
   states_.update(in);
   // A gap makes dependent constraints independent, by pivots of the order of its square: they are
   // zero as well. And it makes what they demand differ.
-  const double gap = widest(states_, model_.n_loops(), false),
-               slip = widest(states_, model_.n_loops(), true);
+  const double gap = widest_miss(model_, states_, false), slip = widest_miss(model_, states_, true);
   if (!asked_) null_ = std::clamp(100 * gap * gap, null_pivot, 1e-4);
   report_.open = std::max(gap, slip);
   sweeps_.start(with_loads);

@@ -509,8 +509,11 @@ Outcome Simulation::evaluate_sample(double t, bool with_loads) {
 
 bool Simulation::write_sample(double t, const Sample& sample) {
   if (sample.needs(Needs::forces)) {
-    if (evaluate_sample(t, sample.needs(Needs::loads)) != Outcome::converged)
+    const Outcome outcome = evaluate_sample(t, sample.needs(Needs::loads));
+    if (outcome != Outcome::converged) {
+      if (failure_.ok()) failure_ = {outcome, t, "", described(outcome)};  // coasting had to end
       return end_all(failure_);
+    }
   } else if (LoopForces* loops = forces_->loops()) {
     loops->update(t, y_.data(), rates_in(y_.data()));
   }

@@ -165,8 +165,10 @@ std::string Simulation::loop_doubt() const {
   if (!loops_ || std::isnan(coasting_.passed())) return {};
   std::ostringstream text;
   text << "no bound of the loads holds: near t = " << std::setprecision(4) << coasting_.passed()
-       << " s the machine passes a singular position, where loads of its loops may grow without "
-          "limit, and peaks are those of the states that were looked at";
+       << " s the machine passes a singular position, or one that is nearly so, where loads of its "
+          "loops may grow without limit, and peaks are those of the states that were looked at. "
+          "The motion there goes on from before, and where it stays near such positions it is not "
+          "known to the tolerance: see that the energy balances";
   return text.str();
 }
 

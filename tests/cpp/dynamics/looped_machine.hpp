@@ -78,6 +78,25 @@ inline ModelSpec row_of_four_bars(int n) {
   return spec;
 }
 
+/// A wheel whose axle has a second bearing, so that the loop joint's angle is the wheel's.
+inline ModelSpec wheel_on_two_bearings(double damping = 0) {
+  ModelSpec spec;
+  spec.links.push_back({"base", 0, {}, {}});
+  spec.links.push_back({"wheel", 1, {}, {{1, 0, 1, 0, 0, 2}}});
+  JointSpec joint;
+  joint.parent = "base";
+  joint.child = "wheel";
+  joint.axes = {{AxisKind::revolute, {0, 0, 1}, 0}};
+  joint.name = "axle";
+  spec.joints.push_back(joint);
+  joint.name = "bearing";
+  joint.dof.push_back({DofProperty::damping, {damping}});
+  LoopJointSpec loop;
+  loop.joint = joint;
+  spec.loop_joints.push_back(loop);
+  return spec;
+}
+
 struct LoopedMachine {
   Model tree, model;  ///< without and with loops
   std::vector<double> q, v;

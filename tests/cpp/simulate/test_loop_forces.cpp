@@ -1,11 +1,13 @@
 // Drives and given motions of joints that close loops: a wheel whose axle has a second bearing, so
 // that the loop joint's angle is the wheel's. And how well forces of large gain are known there, as
 // in the same machine with another joint cut.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
+#include "dynamics/looped_machine.hpp"
 #include "linkwise/base/error.hpp"
 #include "linkwise/simulate/loop_forces.hpp"
 #include "simulate/recording.hpp"
@@ -14,21 +16,7 @@ namespace linkwise::testing {
 namespace {
 
 std::shared_ptr<const Model> wheel(double damping = 0) {
-  ModelSpec spec;
-  spec.links.push_back({"base", 0, {}, {}});
-  spec.links.push_back({"wheel", 1, {}, {{1, 0, 1, 0, 0, 2}}});
-  JointSpec joint;
-  joint.parent = "base";
-  joint.child = "wheel";
-  joint.axes = {{AxisKind::revolute, {0, 0, 1}, 0}};
-  joint.name = "axle";
-  spec.joints.push_back(joint);
-  joint.name = "bearing";
-  joint.dof.push_back({DofProperty::damping, {damping}});
-  LoopJointSpec loop;
-  loop.joint = joint;
-  spec.loop_joints.push_back(loop);
-  return std::make_shared<const Model>(spec);
+  return std::make_shared<const Model>(wheel_on_two_bearings(damping));
 }
 
 TEST(LoopForces, TurnsAreCountedFromTheLastAcceptedState) {
@@ -103,7 +91,8 @@ struct Cell {
   std::vector<double> q;
   int load;  ///< row of the slide
 
-  Cell(bool closes, std::vector<std::pair<DofProperty, double>> properties) {
+  /// crank: direction of the crank at the start.
+  Cell(bool closes, std::vector<std::pair<DofProperty, double>> properties, double crank = -0.7) {
     ModelSpec spec;
     spec.gravity = {0, 0, -9.81};
     spec.links.push_back({"ground", 0, {}, {}});
@@ -128,9 +117,9 @@ struct Cell {
     cell.type = JointType::prismatic;
     cell.axes = {{AxisKind::prismatic, {0, 0, 1}, 0}};
     for (const auto& [property, value] : properties) cell.dof.push_back({property, {value}});
-    // Directions of the crank, of the coupler away from it, and of the rocker towards its pivot.
-    const double crank = -0.7, x = 1 - 0.3 * std::cos(crank), z = 0.3 * std::sin(crank),
-                 r = std::hypot(x, z), to_pivot = std::atan2(-z, x),
+    // Directions of the coupler away from the crank, and of the rocker towards its pivot.
+    const double x = 1 - 0.3 * std::cos(crank), z = 0.3 * std::sin(crank), r = std::hypot(x, z),
+                 to_pivot = std::atan2(-z, x),
                  coupler = to_pivot - std::acos((1 + r * r - 0.64) / (2 * r)),
                  rocker = to_pivot + std::acos((0.64 + r * r - 1) / (1.6 * r)),
                  pi = std::numbers::pi;
@@ -179,22 +168,32 @@ double largest_difference(const std::vector<double>& a, const std::vector<double
   return out;
 }
 
+/// Of three starts that differ by some milliradians, because the largest error of a run with coarse
+/// steps is a matter of chance.
+double middle_error(bool closes, const std::vector<std::pair<DofProperty, double>>& properties,
+                    double tolerance) {
+  std::vector<double> errors;
+  for (const double crank : {-0.7, -0.697, -0.694}) {
+    const std::vector<double> truth = Cell(false, properties, crank).forces(1e-11);
+    double largest = 0;
+    for (const double force : truth) largest = std::max(largest, std::abs(force));
+    EXPECT_GT(largest, 10);
+    std::string doubt;
+    const Cell cell(closes, properties, crank);
+    errors.push_back(largest_difference(cell.forces(tolerance, &doubt), truth) / largest);
+    EXPECT_EQ(doubt, "");
+  }
+  std::ranges::sort(errors);
+  return errors[1];
+}
+
 TEST(LoopForces, AStiffSpringIsAsWellKnownAsInTheTree) {
   const std::vector<std::pair<DofProperty, double>> stiff = {{DofProperty::stiffness, 1e8},
                                                              {DofProperty::damping, 1e4}};
-  const Cell tree(false, stiff), loop(true, stiff);
-  const std::vector<double> truth = tree.forces(1e-11);
-  const double largest = std::abs(*std::ranges::max_element(
-      truth, [](double a, double b) { return std::abs(a) < std::abs(b); }));
-  EXPECT_GT(largest, 10);
   for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
     SCOPED_TRACE(tolerance);
-    std::string doubt;
-    EXPECT_LT(largest_difference(loop.forces(tolerance, &doubt), truth), 1e-2 * largest);
-    EXPECT_EQ(doubt, "");
-    // Coarse steps of the tree itself err by up to 2.5e-2, as rounding lets them fall.
-    const double within = tolerance > 1e-5 ? 5e-2 : 1e-2;
-    EXPECT_LT(largest_difference(tree.forces(tolerance), truth), within * largest);
+    for (const bool closes : {false, true})
+      EXPECT_LT(middle_error(closes, stiff, tolerance), 1e-2) << closes;
   }
 }
 

@@ -118,21 +118,7 @@ TEST(LoopWatch, SlopesByHingesAreExact) {
 }
 
 TEST(LoopWatch, InertiaIsThatOfTheJointInTheTree) {
-  // A wheel whose axle has a second bearing.
-  ModelSpec spec;
-  spec.links.push_back({"base", 0, {}, {}});
-  spec.links.push_back({"wheel", 1, {}, {{1, 0, 1, 0, 0, 2}}});
-  JointSpec joint;
-  joint.parent = "base";
-  joint.child = "wheel";
-  joint.axes = {{AxisKind::revolute, {0, 0, 1}, 0}};
-  joint.name = "axle";
-  spec.joints.push_back(joint);
-  joint.name = "bearing";
-  LoopJointSpec loop;
-  loop.joint = joint;
-  spec.loop_joints.push_back(loop);
-  Watched at{LoopedMachine(spec)};
+  Watched at{LoopedMachine(wheel_on_two_bearings())};
   at.watch->update(0, at.y.data());
   EXPECT_NEAR(at.watch->inertia(1), 2, 1e-12);
 }
