@@ -7,6 +7,7 @@ void bind_builder(nanobind::module_& m);
 void bind_frame(nanobind::module_& m);
 void bind_model(nanobind::module_& m);
 void bind_dynamics(nanobind::module_& m);
+void bind_inverse(nanobind::module_& m);
 void bind_causes(nanobind::module_& m);
 void bind_indeterminacy(nanobind::module_& m);
 void bind_loop_gaps(nanobind::module_& m);

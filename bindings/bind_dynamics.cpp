@@ -72,27 +72,6 @@ nb::object forward_dynamics(const PyModel& self, const States& s, bool passive, 
   return nb::cast(std::move(result));
 }
 
-nb::object inverse_dynamics(const PyModel& self, nb::handle q, nb::handle v, nb::handle a,
-                            nb::handle external, const std::vector<std::string>& driven,
-                            bool passive, double gravity, nb::handle threads, bool loads) {
-  const Model& m = *self.model;
-  const States s(m, q, v, a, "acceleration", external);
-  const Executor executor = executor_for(whole_number(threads, "threads"), s.count * m.n_bodies());
-  NewArray out(s.lead, loads ? Shape{size(m.n_loads()), 6} : Shape{size(m.nv())});
-  BatchInput in = s.input();
-  std::swap(in.tau, in.du);
-  in.gravity_factor = gravity;
-  in.passive_acts = passive;
-  const EvaluationReport report = without_gil([&](const GoOn& go_on) {
-    return self.evaluator.inverse_dynamics(s.count, in, driven, executor,
-                                           loads ? nullptr : out.data, loads ? out.data : nullptr,
-                                           go_on);
-  });
-  if (!report.ok()) throw NumericsError(failure_text(m, report));
-  check_result(out.data, s.count * size(loads ? 6 * m.n_loads() : m.nv()));
-  return out.array;
-}
-
 nb::object joint_loads(const PyModel& self, nb::handle q, nb::handle v, nb::handle tau,
                        nb::handle external, nb::handle loop_tau, bool passive,
                        const std::string& method, const std::string& solver, nb::handle threads) {
@@ -247,47 +226,7 @@ void bind_forward(nb::module_& m) {
           .c_str());
 }
 
-void bind_inverse(nb::module_& m) {
-  const auto of_motion = [&](const char* name, auto function, const std::string& title,
-                             const char* returns) {
-    m.def(
-        name, function, "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(), nb::kw_only(),
-        "external"_a = nb::none(), "driven"_a = std::vector<std::string>(), "passive"_a = false,
-        "gravity"_a = 1.0, "threads"_a = nb::none(),
-        doc::text(
-            (title + R"( of a given motion, by the recursion of Newton and Euler [luh1980].
-
-Machines with closed loops need `driven`: with more joints than ways to move, torques are not
-determined. Loads that rigid bodies do not determine are those of least energy, as of joint_loads.)")
-                .c_str(),
-            {doc::q_v_acceleration, doc::external,
-             R"(    driven: names of the joints that may have torques; none: all those of a tree.
-    passive: the model's damping, friction, springs and stops act beside the torques.
-)",
-             doc::gravity},
-            returns,
-            R"(shapes do not fit the model, a number is not finite, accelerations open a loop, or the
-    driven joints cannot make the motion or repeat each other.
-    NumericsError: the position is singular.)")
-            .c_str());
-  };
-  of_motion(
-      "inverse_dynamics",
-      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
-         const std::vector<std::string>& driven, bool passive, double gravity, nb::handle threads) {
-        return inverse_dynamics(self, q, v, a, external, driven, passive, gravity, threads, false);
-      },
-      "Joint torques",
-      R"(    tau (..., nv) [N m, N], the torque of the rotors (armature) included. Without `passive`
-    it is the total: less passive_torque it is what the drives give. It is what forward_dynamics takes
-    to make the accelerations, with the same `passive`.)");
-  of_motion(
-      "inverse_dynamics_loads",
-      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a, nb::handle external,
-         const std::vector<std::string>& driven, bool passive, double gravity, nb::handle threads) {
-        return inverse_dynamics(self, q, v, a, external, driven, passive, gravity, threads, true);
-      },
-      "Joint loads", "    (..., n_joints + n_loops, 6) [N, N m]: as of joint_loads.");
+void bind_loads(nb::module_& m) {
   m.def(
       "joint_loads", &joint_loads, "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(),
       nb::kw_only(), "external"_a = nb::none(), "loop_tau"_a = nb::none(), "passive"_a = false,
@@ -335,7 +274,7 @@ void bind_dynamics(nb::module_& m) {
   bind_assembly(m);
   bind_results(m);
   bind_forward(m);
-  bind_inverse(m);
+  bind_loads(m);
   m.def(
       "solvers", &solver_list,
       "The table of linear solvers: dictionaries of name, description, kind, parallel, reference.");

@@ -84,34 +84,12 @@ void of_states(nb::module_& m, const char* name, ShapeOf shape, OfStates f, cons
       doc::text(title, {doc::q_v}, returns).c_str());
 }
 
-nb::object mass_matrix(const PyModel& self, nb::handle q, nb::handle threads) {
-  const Model& m = *self.model;
-  const size_t nv = size(m.nv());
-  const States s(m, q, nb::none(), nb::none(), "tau", nb::none());
-  const Executor executor = executor_for(whole_number(threads, "threads"), s.count * m.n_bodies());
-  NewArray H(s.lead, {nv, nv});
-  without_gil([&](const GoOn& go_on) {
-    self.evaluator.mass_matrix(s.count, s.q.data, executor, H.data, go_on);
-  });
-  check_result(H.data, s.count * nv * nv);
-  return H.array;
-}
-
 void passive_torque(const Model& m, const double* q, const double* v, double* out) {
   std::fill(out, out + m.nv(), 0.0);
   add_passive_forces(m, q, v, out);
 }
 
 void bind_forces(nb::module_& m) {
-  m.def("mass_matrix", &mass_matrix, "model"_a, "q"_a, nb::kw_only(), "threads"_a = nb::none(),
-        doc::text(R"(Joint-space mass matrix H with H dv/dt + bias = tau, by composite rigid bodies
-[walker1982].)",
-                  {doc::q},
-                  "    H (..., nv, nv) [kg m2, kg m, kg], symmetric, armatures on its diagonal. It "
-                  "is that of the\n"
-                  "    tree: joints that close loops and couplings constrain the rates and leave H "
-                  "as it is.")
-            .c_str());
   of_states(m, "passive_torque", &per_rate, &passive_torque,
             "Torque of the joints' own damping, friction, springs and compliant stops.",
             "    (..., nv) [N m, N], to be added to the drives' torque; docs/theory/forces.md has "

@@ -41,6 +41,7 @@ Raises:
   linkwise::bindings::bind_model(m);
   linkwise::bindings::bind_loop_gaps(m);
   linkwise::bindings::bind_dynamics(m);
+  linkwise::bindings::bind_inverse(m);
   linkwise::bindings::bind_causes(m);
   linkwise::bindings::bind_indeterminacy(m);
   linkwise::bindings::bind_kinematics(m);

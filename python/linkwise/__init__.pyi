@@ -9,6 +9,7 @@ from linkwise._core import ForwardDynamicsResult as ForwardDynamicsResult
 from linkwise._core import Frame as Frame
 from linkwise._core import Indeterminacy as Indeterminacy
 from linkwise._core import InputError as InputError
+from linkwise._core import InverseDynamicsResult as InverseDynamicsResult
 from linkwise._core import Model as Model
 from linkwise._core import ModelBuilder as ModelBuilder
 from linkwise._core import Note as Note
@@ -16,6 +17,7 @@ from linkwise._core import NumericsError as NumericsError
 from linkwise._core import Report as Report
 from linkwise._core import Spectrum as Spectrum
 from linkwise._core import body_jacobian as body_jacobian
+from linkwise._core import driven_jacobian as driven_jacobian
 from linkwise._core import forward_dynamics as forward_dynamics
 from linkwise._core import frame_acceleration as frame_acceleration
 from linkwise._core import frame_jacobian as frame_jacobian

@@ -66,7 +66,7 @@ CALLS = {
     "solver tolerance stop max_iterations:count solver_options:options threads full:flag "
     "gravity:number",
     "inverse_dynamics": "*q *v *acceleration:v external:wrenches driven:joints passive:flag "
-    "gravity:number threads",
+    "full:flag gravity:number threads",
     "inverse_dynamics_loads": "*q *v *acceleration:v external:wrenches driven:joints passive:flag "
     "gravity:number threads",
     "joint_loads": "*q *v tau:v loop_tau:loop_rates external:wrenches passive:flag method solver "
@@ -79,7 +79,8 @@ CALLS = {
     "loop_coordinates": "*q v",
     "indeterminacy": "*q:state",
     "assemble": "q0:state v0:rates",
-    "mass_matrix": "*q threads",
+    "mass_matrix": "*q driven:joints threads",
+    "driven_jacobian": "*q *driven:joints threads",
     "body_jacobian": "*q *body threads",
     "frame_pose": "*q *frame:link threads",
     "frame_velocity": "*q *v *frame:link axes:frame threads",

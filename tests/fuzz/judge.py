@@ -93,6 +93,8 @@ def must_be_finite(value, what):
         if value.report.outcome != "converged":
             return  # it says so
         must_be_finite([value.acceleration, value.joint_load, value.constraint_force], what)
+    elif isinstance(value, lw.InverseDynamicsResult):
+        must_be_finite([value.tau, value.loop_tau, value.joint_load], what)
 
 
 def check_run(run):

@@ -43,7 +43,8 @@ def test_an_input_is_made_from_its_kind_and_number(kind, tmp_path):
 OTHERWISE = {
     *("load", "load_scenario", "run_scenario", "open_run", "sweep", "drives", "loads", "scenes"),
     *("methods", "solvers", "integrators", "initial_guesses", "stop_rules", "solver_options"),
-    *("numerics", "quantities", "ForwardDynamicsResult", "Note", "Report", "Spectrum", "Run"),
+    *("numerics", "quantities", "ForwardDynamicsResult", "InverseDynamicsResult", "Note"),
+    *("Report", "Spectrum", "Run"),
     *("Progress", "InputError", "NumericsError", "SimulationError", "SimulationInterrupted"),
     *("ModelWarning", "Drive", "Free", "Locked", "ConstraintSystem", "DynamicsMethod", "Frame"),
     *("Model", "ModelBuilder", "Indeterminacy", "Assembly"),

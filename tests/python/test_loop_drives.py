@@ -248,6 +248,3 @@ def test_what_does_not_take_given_motions_of_loop_joints_says_so():
     run = simulate_both({"c": motion})[0]
     with pytest.raises(lw.InputError, match=r"joint 'c' closes a loop and its motion is given"):
         lw.loads.split(run)
-    model = four_bar("c", c={"armature": 0.3})
-    with pytest.raises(lw.InputError, match=r"joint 'c' closes a loop and has an armature"):
-        lw.inverse_dynamics(model, np.zeros(3), None, np.zeros(3), driven=["a"])

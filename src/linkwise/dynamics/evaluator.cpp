@@ -8,7 +8,7 @@
 #include "linkwise/base/memory.hpp"
 #include "linkwise/constraint/joint_constraint.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
-#include "linkwise/dynamics/driven_inverse.hpp"
+#include "linkwise/dynamics/loop_rates.hpp"
 #include "linkwise/dynamics/parts.hpp"
 #include "linkwise/solve/direct/direct_solver.hpp"
 
@@ -54,6 +54,11 @@ class PartsReport {
   std::atomic<int> body_{-1};
   std::atomic<bool> finite_{true};
 };
+
+/// What begins messages about state i.
+std::string of_state(size_t i, size_t count) {
+  return count > 1 ? "state " + std::to_string(i) + ": " : "";
+}
 
 /// `rows` rows of results from `first` on; absent ones are finite.
 bool rows_finite(const double* results, size_t first, size_t rows, size_t width) {
@@ -207,6 +212,7 @@ struct Evaluator::Workspace {
   const Model& model;
   BatchEvaluator batch;
   std::unique_ptr<CompositeRigidBody> composite;
+  std::unique_ptr<LoopRates> loops;
   std::unique_ptr<DynamicsMethod> method;
   DynamicsOptions method_options;
   Choice choice;
@@ -399,30 +405,30 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
 
 EvaluationReport Evaluator::inverse_dynamics(size_t count, const BatchInput& states,
                                              std::span<const std::string> driven,
-                                             const Executor& executor, double* tau, double* loads,
+                                             const Executor& executor, const InverseOutput& out,
                                              const GoOn& go_on) const {
   const Model& m = *model_;
   DynamicsReport report;
   if (m.is_constrained() || !driven.empty()) {
-    driven_inverse(count, states, driven, tau, loads, report, go_on);
+    driven_inverse(count, states, driven, out, report, go_on);
     return evaluation_report(m, {"articulated_body", "", ""}, report);
   }
   check_states(m, count, states);
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);
     workspace->batch.inverse_dynamics(n, states.from(m, first),
-                                      tau ? tau + first * m.nv() : nullptr,
-                                      loads ? loads + first * 6 * m.n_joints() : nullptr);
+                                      out.tau ? out.tau + first * m.nv() : nullptr,
+                                      out.loads ? out.loads + first * 6 * m.n_joints() : nullptr);
   });
-  if (tau && states.passive_acts && m.has_passive_forces()) {
+  if (out.tau && states.passive_acts && m.has_passive_forces()) {
     const std::vector<double> passive = with_passive_forces(m, count, states, nullptr);
-    for (size_t i = 0; i < passive.size(); ++i) tau[i] -= passive[i];
+    for (size_t i = 0; i < passive.size(); ++i) out.tau[i] -= passive[i];
   }
   return evaluation_report(m, {}, report);
 }
 
 void Evaluator::driven_inverse(size_t count, const BatchInput& states,
-                               std::span<const std::string> driven, double* tau, double* loads,
+                               std::span<const std::string> driven, const InverseOutput& out,
                                DynamicsReport& report, const GoOn& go_on) const {
   const Model& m = *model_;
   require_determined(m);
@@ -431,11 +437,28 @@ void Evaluator::driven_inverse(size_t count, const BatchInput& states,
   acting.tau = acting.du = nullptr;
   AppliedStates applied(m, count, acting);
   const std::vector<double> rest(m.nv());
-  const size_t nv = m.nv(), n_load = 6 * static_cast<size_t>(m.n_loads());
+  const auto row = [](double* x, size_t i, size_t n) { return x ? x + i * n : nullptr; };
+  const size_t nv = m.nv();
   for (size_t i = 0; i < count && report.ok() && go_on(); ++i)
     report = kernel.evaluate(applied[i], states.du ? states.du + i * nv : rest.data(),
-                             count > 1 ? "state " + std::to_string(i) + ": " : "",
-                             tau ? tau + i * nv : nullptr, loads ? loads + i * n_load : nullptr);
+                             of_state(i, count),
+                             {row(out.tau, i, nv), row(out.loop_tau, i, m.loops.nv),
+                              row(out.loads, i, 6 * static_cast<size_t>(m.n_loads()))});
+}
+
+EvaluationReport Evaluator::reduce(size_t count, const double* q, DrivenInverse& driven, double* M,
+                                   double* N, const GoOn& go_on) const {
+  const Model& m = *model_;
+  require_determined(m);
+  BatchInput states;
+  states.q = q;
+  AppliedStates applied(m, count, states);
+  const size_t n = driven.n_driven();
+  DynamicsReport report;
+  for (size_t i = 0; i < count && report.ok() && go_on(); ++i)
+    report = driven.reduce(applied[i].q, of_state(i, count), M ? M + i * n * n : nullptr,
+                           N ? N + i * n * m.nv() : nullptr);
+  return evaluation_report(m, {"articulated_body", "", ""}, report);
 }
 
 void Evaluator::mass_matrix(size_t count, const double* q, const Executor& executor, double* H,
@@ -444,9 +467,14 @@ void Evaluator::mass_matrix(size_t count, const double* q, const Executor& execu
   const size_t nv = m.nv();
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);
-    if (!workspace->composite) workspace->composite = std::make_unique<CompositeRigidBody>(m);
-    for (size_t i = first; i < first + n; ++i)
+    if (!workspace->composite) {
+      workspace->composite = std::make_unique<CompositeRigidBody>(m);
+      workspace->loops = std::make_unique<LoopRates>(m);
+    }
+    for (size_t i = first; i < first + n; ++i) {
       workspace->composite->mass_matrix(q + i * m.nq(), H + i * nv * nv);
+      workspace->loops->add_rotors_to(q + i * m.nq(), H + i * nv * nv);
+    }
   });
 }
 

@@ -15,6 +15,7 @@
 
 #include "linkwise/dynamics/applied_states.hpp"
 #include "linkwise/dynamics/batch.hpp"
+#include "linkwise/dynamics/driven_inverse.hpp"
 #include "linkwise/dynamics/forward_dynamics.hpp"
 #include "linkwise/dynamics/parts.hpp"
 
@@ -47,6 +48,13 @@ struct ForwardOutput {
   std::vector<double>* constraint_force = nullptr;  ///< [count][unknowns]; empty without any
 };
 
+/// Where inverse dynamics goes; what is null is not computed.
+struct InverseOutput {
+  double* tau = nullptr;       ///< [count][nv]
+  double* loop_tau = nullptr;  ///< [count][nv of loop joints]; only of driven ones
+  double* loads = nullptr;     ///< [count][n_loads][6]
+};
+
 /// InputError, listing the known names, when one is unknown.
 std::vector<Cause> causes_from_names(std::span<const std::string> names);
 
@@ -70,17 +78,23 @@ class Evaluator {
                                   const std::string& method, const Executor& executor,
                                   double* loads, const GoOn& go_on) const;
 
-  /// tau [count][nv] and loads [count][n_loads][6] of the accelerations states.du; either may be
-  /// null. With passive_acts tau is what the drives give beside the passive forces. driven: joints
-  /// that may have torques, none: all those of a tree. Machines with loops need some
-  /// (driven_inverse.hpp), one state after the other; of trees nothing fails but input.
+  /// Torques of the accelerations states.du, and loads. With passive_acts torques are what the
+  /// drives give beside the passive forces. driven: joints that may have torques, none: all those
+  /// of a tree. Machines with loops need some (driven_inverse.hpp), one state after the other; of
+  /// trees nothing fails but input.
   EvaluationReport inverse_dynamics(size_t count, const BatchInput& in,
                                     std::span<const std::string> driven, const Executor& executor,
-                                    double* tau, double* loads, const GoOn& go_on) const;
+                                    const InverseOutput& out, const GoOn& go_on) const;
 
-  /// H [count][nv][nv] of the tree; loops and couplings leave it as it is.
+  /// H [count][nv][nv] of the tree and of all rotors; loops and couplings constrain the rates and
+  /// leave it as it is.
   void mass_matrix(size_t count, const double* q, const Executor& executor, double* H,
                    const GoOn& go_on) const;
+
+  /// M [count][n][n] in the coordinates of the n driven degrees of freedom, and the rates
+  /// N [count][nv][n] that these make; either may be null.
+  EvaluationReport reduce(size_t count, const double* q, DrivenInverse& driven, double* M,
+                          double* N, const GoOn& go_on) const;
 
  private:
   struct Workspace;
@@ -89,7 +103,7 @@ class Evaluator {
   Pick pick(Workspace& workspace, size_t count, const DynamicsOptions& options, bool forces,
             Choice& choice) const;
   void driven_inverse(size_t count, const BatchInput& states, std::span<const std::string> driven,
-                      double* tau, double* loads, DynamicsReport& report, const GoOn& go_on) const;
+                      const InverseOutput& out, DynamicsReport& report, const GoOn& go_on) const;
   DynamicsReport over_threads(size_t count, const BatchInput& states,
                               const DynamicsOptions& options, const ForwardOutput& out,
                               const GoOn& go_on) const;

@@ -36,7 +36,8 @@ Motion driven_by(const LoopedMachine& machine, const Names& driven, const std::v
   Motion motion{std::vector<double>(machine.model.nv()), a,
                 std::vector<double>(6 * static_cast<size_t>(machine.model.n_loads()))};
   DrivenInverse inverse(machine.model, driven);
-  EXPECT_TRUE(inverse.evaluate(in, a.data(), "", motion.tau.data(), motion.loads.data()).ok());
+  EXPECT_TRUE(
+      inverse.evaluate(in, a.data(), "", {motion.tau.data(), nullptr, motion.loads.data()}).ok());
   return motion;
 }
 

@@ -158,7 +158,7 @@ TEST(Evaluator, PassiveForcesActWhereAskedFor) {
     // The same accelerations take the torques and what the damper takes away.
     std::vector<double> tau(with.tau.size());
     BatchInput in{with.q.data(), with.v.data(), nullptr, with.du.data()};
-    Evaluator(damped).inverse_dynamics(count, in, {}, Executor(1), tau.data(), nullptr, go_on);
+    Evaluator(damped).inverse_dynamics(count, in, {}, Executor(1), {.tau = tau.data()}, go_on);
     for (size_t i = 0; i < tau.size(); ++i)
       EXPECT_NEAR(tau[i], with.tau[i] - 0.7 * with.v[i], 1e-9);
   }
