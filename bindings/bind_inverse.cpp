@@ -54,7 +54,7 @@ nb::object inverse_dynamics(const PyModel& self, const InverseArguments& given,
   if (full) loop_tau.emplace(s.lead, Shape{size(m.loops.nv)});
   if (wanted != InverseWanted::torques) loads.emplace(s.lead, Shape{size(m.n_loads()), 6});
   BatchInput in = s.input();
-  std::swap(in.tau, in.du);
+  in.du = std::exchange(in.tau, nullptr);
   in.gravity_factor = given.gravity;
   in.passive_acts = given.passive;
   if (loop_tau) std::fill_n(loop_tau->data, s.count * m.loops.nv, 0.0);

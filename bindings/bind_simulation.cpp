@@ -154,10 +154,10 @@ void bind_drives(nb::class_<PySimulation>& simulation) {
            "values"_a, "interpolation"_a = "linear")
       .def("drive_locked", &PySimulation::locked, "joint"_a)
       .def("drive_free", &PySimulation::free, "joint"_a)
-      .def("wrench", &PySimulation::wrench, "at"_a, "value"_a, "frame"_a = "world")
+      .def("wrench", &PySimulation::wrench, "at"_a, "value"_a, "axes"_a = "world")
       .def("wrench_table", &PySimulation::wrench_table, "at"_a, "times"_a, "values"_a,
-           "interpolation"_a = "linear", "frame"_a = "world")
-      .def("wrench_callable", &PySimulation::wrench_callable, "at"_a, "fn"_a, "frame"_a = "world",
+           "interpolation"_a = "linear", "axes"_a = "world")
+      .def("wrench_callable", &PySimulation::wrench_callable, "at"_a, "fn"_a, "axes"_a = "world",
            "breakpoints"_a = nb::none(), "samples"_a = nb::none());
 }
 

@@ -183,23 +183,23 @@ void PySimulation::locked(const std::string& joint) {
 
 void PySimulation::free(const std::string& joint) { set(joint, {}); }
 
-void PySimulation::wrench(nb::handle at, nb::handle value, const std::string& frame) {
-  Wrench w = wrench_at(*model, as_frame(at), frame);
+void PySimulation::wrench(nb::handle at, nb::handle value, const std::string& axes) {
+  Wrench w = wrench_at(*model, as_frame(at), axes);
   w.value = constants(value, "wrench", 6);
   simulation.add_wrench(std::move(w));
 }
 
 void PySimulation::wrench_table(nb::handle at, nb::handle times, nb::handle values,
-                                const std::string& interpolation, const std::string& frame) {
-  Wrench w = wrench_at(*model, as_frame(at), frame);
+                                const std::string& interpolation, const std::string& axes) {
+  Wrench w = wrench_at(*model, as_frame(at), axes);
   w.table = make_table(times, values, interpolation, 6);
   simulation.add_wrench(std::move(w));
 }
 
-void PySimulation::wrench_callable(nb::handle at, nb::callable fn, const std::string& frame,
+void PySimulation::wrench_callable(nb::handle at, nb::callable fn, const std::string& axes,
                                    nb::handle breakpoints, nb::handle samples) {
   const Frame where = as_frame(at);
-  Wrench w = wrench_at(*model, where, frame);
+  Wrench w = wrench_at(*model, where, axes);
   w.course = course_of(breakpoints, samples, 6);
   w.callable = [fn = keep(std::move(fn)), link = where.link](double t, double* out) {
     const GilHeld held;

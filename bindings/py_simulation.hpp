@@ -30,10 +30,10 @@ class PySimulation {
                 const std::string& interpolation);
   void locked(const std::string& joint);
   void free(const std::string& joint);
-  void wrench(nb::handle at, nb::handle value, const std::string& frame);
+  void wrench(nb::handle at, nb::handle value, const std::string& axes);
   void wrench_table(nb::handle at, nb::handle times, nb::handle values,
-                    const std::string& interpolation, const std::string& frame);
-  void wrench_callable(nb::handle at, nb::callable fn, const std::string& frame,
+                    const std::string& interpolation, const std::string& axes);
+  void wrench_callable(nb::handle at, nb::callable fn, const std::string& axes,
                        nb::handle breakpoints, nb::handle samples);
   void keep_extremes(nb::handle directions);
   nb::object extremes();

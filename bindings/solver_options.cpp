@@ -43,7 +43,7 @@ SolverOptionValues solver_option_values(nb::handle given) {
 
 nb::list solver_option_list() {
   return table_rows(solver_options(), [](auto&& row, const SolverOption& known) {
-    row("name", known.option->name);
+    row("name", known.name);
     std::visit([&](const auto& fallback) { row("default", fallback); }, known.option->fallback);
     row("description",
         (known.owners.empty() ? "" : known.owners + ": ") + std::string(known.option->text));

@@ -39,7 +39,7 @@ struct States {
     in.v = v.data;
     in.tau = tau.data;
     in.external = external.data;
-    in.du = prescribed.data;
+    in.prescribed = prescribed.data;
     in.loop_tau = loop_tau.data;
     return in;
   }

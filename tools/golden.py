@@ -235,7 +235,7 @@ def followed(model: lw.Model, batch: dict[str, Any]) -> dict[str, Any]:
     q, v = batch["q"][:1], batch["v"][:1]
     times = np.linspace(0, 0.01, 8)
     for guess in (entry["name"] for entry in lw.initial_guesses()):
-        evaluator = lw.Evaluator(model, method="constraint_force", solver="conjugate_gradient",
+        evaluator = lw.DynamicsMethod(model, method="constraint_force", solver="conjugate_gradient",
                                  initial_guess=guess, threads=1)  # fmt: skip
         rows = np.repeat(q, times.size, axis=0), v * (1 + times[:, None])
         result = evaluator.follow(times, *rows)

@@ -12,7 +12,6 @@ from __future__ import annotations
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-from warnings import warn
 
 # The public names stand in __init__.pyi, one in a line `from MODULE import NAME as NAME`. They are
 # imported when first used: the command line must answer `--help` without loading NumPy, xarray and
@@ -23,16 +22,11 @@ _HOME = {
     words[3]: words[1] for words in map(str.split, _STUB.splitlines()) if words[:1] == ["from"]
 }
 __all__ = sorted(_HOME)
-# Names that scripts written before the first release may use.
-_FORMER = {"Evaluator": "DynamicsMethod", "body_poses": "joint_poses"}
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         value = import_module("linkwise.record.provenance").versions()["linkwise"]
-    elif name in _FORMER:
-        warn(f"linkwise.{name} is now {_FORMER[name]}", DeprecationWarning, stacklevel=2)
-        return __getattr__(_FORMER[name])
     elif name not in _HOME:
         raise AttributeError(f"module 'linkwise' has no attribute {name!r}")
     elif _HOME[name] == "linkwise":

@@ -61,7 +61,7 @@ def warning_attrs(found: Iterable[Ignored]) -> dict[str, str]:
 
 
 def recorded_warnings(attrs: Mapping[Any, Any]) -> list[dict[str, str]]:
-    """What `warning_attrs` wrote; nothing where an older linkwise wrote the run.
+    """What `warning_attrs` wrote; nothing where there is none.
 
     A run may come from anywhere: what is not a warning is left out.
     """

@@ -13,9 +13,8 @@ namespace linkwise {
 
 /// Two methods, one of which takes rigid bodies alone.
 std::span<const DynamicsEntry> dynamics_table() {
-  static const DynamicsEntry table[] = {
-      {"narrow", "", "", false, false, false, true, false, nullptr},
-      {"wide", "", "", false, false, true, true, false, nullptr}};
+  static const DynamicsEntry table[] = {{.name = "narrow", .linear_time = true},
+                                        {.name = "wide", .any_body = true, .linear_time = true}};
   return table;
 }
 

@@ -66,15 +66,15 @@ def test_spring_locked_free():
 
 def test_wrench():
     name, (body, value), options = call_of(Wrench([1, 2, 3, 4, 5, 6], axes="frame"), "hand")
-    assert (name, body, options) == ("wrench", "hand", {"frame": "body"})
+    assert (name, body, options) == ("wrench", "hand", {"axes": "frame"})
     np.testing.assert_array_equal(value, [1, 2, 3, 4, 5, 6])
     table = Table([0, 1], np.ones((2, 6)))
     name, (_, times, values), options = call_of(Wrench(table))
     assert (name, values.shape) == ("wrench_table", (2, 6))
-    assert options == {"interpolation": "linear", "frame": "world"}
+    assert options == {"interpolation": "linear", "axes": "world"}
     np.testing.assert_array_equal(times, [0, 1])
     name, (_, function), options = call_of(Wrench(math.sin))
-    assert (name, function, options) == ("wrench_callable", math.sin, {"frame": "world"})
+    assert (name, function, options) == ("wrench_callable", math.sin, {"axes": "world"})
 
 
 def test_shorthands():

@@ -224,7 +224,7 @@ def test_axes_of_a_scenario_are_those_of_the_components(leg, tmp_path):
     [
         ("[wrench.push]\nforce = [0, 0, 1]", "wrench.push: is no link of the model and names none"),
         ("[wrench.p]\nlink = 'shonk'\nforce = [0, 0, 1]", r"wrench.p.link: .*mean 'shank'"),
-        ("[wrench.shank]\naxes = [0, 0, 1]\nframe = 'world'\nforce = [0, 0, 1]", "keep one"),
+        ("[wrench.shank]\nframe = 'world'\nforce = [0, 0, 1]", "wrench.shank.frame: unknown key"),
         ("[wrench.shank]\npoint = [0, 0]\nforce = [0, 0, 1]", "wrench.shank.point: has 2 numbers"),
         ("[wrench.shank]\npoint = [0, 0, '1 s']\nforce = [0, 0, 1]", "wrench.shank.point"),
         ("[wrench.base]\nforce = [0, 0, 1]", r"'base' of .*fixed to the ground"),
@@ -311,15 +311,7 @@ def test_at_a_frame_with_axes_it_must_be_said_whose_the_components_are(leg):
     hold(leg, {lw.Frame("shank", (0.01, 0, -0.25)): UP})
 
 
-def test_the_former_name_of_the_axes():
-    """frame="body" is axes="frame": both names had another meaning than lw.Frame."""
-    for former, axes in (("body", "frame"), ("world", "world")):
-        with pytest.warns(DeprecationWarning, match=f"frame= is now axes=; give axes='{axes}'"):
-            old = lw.Wrench(UP, frame=former)
-        assert old.axes == axes
-        with pytest.warns(DeprecationWarning, match=r"Wrench\.frame is now Wrench\.axes"):
-            assert old.frame == former
-    with pytest.warns(DeprecationWarning, match="give axes='frame'"):
-        assert lw.Wrench(UP, "body").axes == "frame"
-    with pytest.raises(lw.InputError, match="wrench axes: 'hand' is unknown; use world or frame"):
-        lw.Wrench(UP, axes="hand")
+@pytest.mark.parametrize("axes", ["hand", "body"])
+def test_axes_are_those_of_the_world_or_of_the_frame(axes):
+    with pytest.raises(lw.InputError, match=f"axes: '{axes}' is unknown; use world or frame"):
+        lw.Wrench(UP, axes=axes)

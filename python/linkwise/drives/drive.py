@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import copy
 import os
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import InitVar, dataclass, field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -413,19 +412,11 @@ class Wrench:
     axes: WrenchAxes | None = field(default=None)
     at: str | Frame | None = field(default=None, kw_only=True)
     breakpoints: npt.ArrayLike | None = field(default=None, kw_only=True)
-    frame: InitVar[str | None] = field(default=None, kw_only=True)
 
-    def __post_init__(self, frame: str | None) -> None:
+    def __post_init__(self) -> None:
         object.__setattr__(self, "breakpoints", as_breakpoints(self.breakpoints, "wrench"))
-        given = self.axes if frame is None else frame
-        if frame is not None or given == "body":  # names that scripts before the release may use
-            check_one_of("wrench frame", given, ("world", "body"))
-            given = "frame" if given == "body" else "world"
-            text = f"Wrench: frame= is now axes=; give axes={given!r}"
-            warnings.warn(text, DeprecationWarning, stacklevel=3)
-            object.__setattr__(self, "axes", given)
-        elif given is not None:
-            check_one_of("wrench axes", given, ("world", "frame"))
+        if self.axes is not None:
+            check_one_of("wrench axes", self.axes, ("world", "frame"))
         if self.at is not None and not isinstance(self.at, str | Frame):
             raise InputError(
                 f"wrench at: {shown(self.at)} is no frame; give the name of a link, or a "
@@ -453,8 +444,8 @@ class Wrench:
             return course(function, self.breakpoints, span)
 
         at = self.where(frame)
-        axes = "world" if self.along_world(at) else "body"
-        _hand_over(simulation, "wrench", at, self.value, known, frame=axes)
+        axes = "world" if self.along_world(at) else "frame"
+        _hand_over(simulation, "wrench", at, self.value, known, axes=axes)
 
     def where(self, frame: str | Frame) -> str | Frame:
         """Where it acts, given for this frame."""
@@ -477,16 +468,6 @@ class Wrench:
                 'are along these: linkwise.Wrench(..., axes="frame"), or axes="world"'
             )
         return self.axes != "frame"
-
-
-def _former_frame(self: Wrench) -> str:
-    """The former name of `axes`, with a DeprecationWarning."""
-    warnings.warn("Wrench.frame is now Wrench.axes", DeprecationWarning, stacklevel=2)
-    return "body" if self.axes == "frame" else "world"
-
-
-# A dataclass would take it for the argument's default.
-Wrench.frame = property(_former_frame)  # type: ignore[attr-defined]
 
 
 def as_drive(value: Any) -> Drive:

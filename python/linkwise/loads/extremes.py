@@ -67,8 +67,8 @@ class State(NamedTuple):
 
 def extremes_of(run: RunLike, name: str) -> Extremes | None:
     """Extremes of a recorded variable, or of the derived quantities (quantity, joint) by the name
-    "quantity"; None where the run holds none: it is of an older linkwise, or was simulated without,
-    or its process was killed before the first were written."""
+    "quantity"; None where the run holds none: it was simulated without, or its process was killed
+    before the first were written."""
     if _PREFIX + name not in run.dataset:
         return None
     values = _rows(run, name, len(fields(Extremes)))

@@ -80,7 +80,7 @@ class CheckedStore(LocalStore):
     """A run's folder, read: each file is checked before anything is made of it.
 
     Raises InputError that names the file. `names` are the arrays that are shown at the top, all by
-    default. A run of an older linkwise has no list; of it only files that cannot be are refused.
+    default. Of a run whose list is missing, only files that cannot be are refused.
     """
 
     def __init__(

@@ -53,8 +53,8 @@ def read_model(path: str | os.PathLike[str]) -> Model:
     store = CheckedStore(folder)
     if not (folder / GROUP).is_dir() and f"{GROUP}/zarr.json" not in (store.checksums or {}):
         raise InputError(
-            f"run {str(folder)!r}: does not hold its model (it is too large, or an older linkwise "
-            "wrote the run); give the model file as well"
+            f"run {str(folder)!r}: does not hold its model, which is too large; give the model "
+            "file as well"
         )
     name = f"{GROUP}/{ARRAY}"
     array = open_array(store, name)

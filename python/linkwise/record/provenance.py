@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 FORMAT_KEY = "linkwise_run"
 FORMAT_VERSION = 2
-READABLE_VERSIONS = (1, 2)
-"""1: without checksums."""
 UNFINISHED = "unfinished"
 
 _RECORDED_PACKAGES = ("linkwise", "numpy", "xarray", "zarr")

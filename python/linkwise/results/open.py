@@ -9,7 +9,7 @@ from pathlib import Path
 from linkwise._core import InputError
 from linkwise.record.checksums import LIST
 from linkwise.record.claim import is_being_written, run_attributes
-from linkwise.record.provenance import FORMAT_KEY, READABLE_VERSIONS, UNFINISHED
+from linkwise.record.provenance import FORMAT_KEY, FORMAT_VERSION, UNFINISHED
 from linkwise.record.read import open_dataset
 from linkwise.record.replace import restore
 from linkwise.results.run import Run
@@ -25,7 +25,7 @@ def open_run(path: str | os.PathLike[str]) -> Run:
         InputError: there is no linkwise run at `path`, or a file that all of it needs is damaged.
             What is damaged elsewhere is said when it is read.
 
-    A run of an older linkwise, without checksums, is read with a warning.
+    A run whose list of checksums is missing is read with a warning.
     """
     where = Path(os.path.abspath(path))
     shown = f"run {str(path)!r}"
@@ -39,15 +39,15 @@ def open_run(path: str | os.PathLike[str]) -> Run:
             raise InputError(f"{shown}: zarr.json is damaged; copy the run again or simulate again")
         raise InputError(f"{shown}: is not a linkwise run; give a folder that linkwise wrote")
     version = attrs[FORMAT_KEY]
-    if version not in READABLE_VERSIONS:
+    if version != FORMAT_VERSION:
         raise InputError(
-            f"{shown}: has format {str(version)[:20]}, this linkwise reads "
-            f"{' and '.join(map(str, READABLE_VERSIONS))}; update linkwise"
+            f"{shown}: has format {str(version)[:20]}, this linkwise reads {FORMAT_VERSION}; "
+            "update linkwise, or simulate again"
         )
     if not listed:
-        why = "an older linkwise wrote it" if version == 1 else f"{LIST} is missing"
         warnings.warn(
-            f"{shown}: has no checksums ({why}); damage to its files would not be noticed",
+            f"{shown}: has no checksums ({LIST} is missing); damage to its files would not be "
+            "noticed",
             UserWarning,
             stacklevel=2,
         )

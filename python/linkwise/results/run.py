@@ -84,10 +84,7 @@ class Run:
     @property
     def warnings(self) -> list[dict[str, str]]:
         """What was ignored or assumed when the machine was read, and what the integrator could not
-        see of the inputs: `element` and `text` of each.
-
-        Empty as well where an older linkwise wrote the run.
-        """
+        see of the inputs: `element` and `text` of each."""
         return recorded_warnings(self.dataset.attrs)
 
     def __repr__(self) -> str:

@@ -302,11 +302,9 @@ class ArgumentBuilder:
     def _wrench(self, name: str, section: WrenchSection) -> drives.Wrench:
         turned = None if isinstance(section.axes, str) else section.axes
         at = Frame(section.link or name, section.point, turned)
-        axes: drives.WrenchAxes = "world"
-        if section.axes is not None:
-            axes = section.axes if isinstance(section.axes, str) else "frame"
-        elif section.frame == "body":
-            axes = "frame"
+        axes: drives.WrenchAxes = "frame"
+        if section.axes is None or isinstance(section.axes, str):
+            axes = section.axes or "world"
         if section.table is None:
             zero = [Quantity(0.0, None)] * 3
             parts = [*(section.force or zero), *(section.moment or zero)]

@@ -6,7 +6,6 @@ import inspect
 import os
 import re
 import tomllib
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,6 @@ from pydantic import ValidationError
 
 from linkwise import scenes
 from linkwise._core import InputError, Model
-from linkwise.base import printable
 from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.files import SCENARIO_BYTES, read_bytes
 from linkwise.io.load import load
@@ -64,16 +62,7 @@ class Scenario(ScenarioSource):
             bare = self._bare_model()
         model = with_properties(self, with_inertias(self, with_loops(self, bare)))
         tell(warnings_of(model), reading=True)
-        self._tell_former_words()
         return model
-
-    def _tell_former_words(self) -> None:
-        """What is still read, and how it is written now; no matter of the machine or its loads."""
-        for name, section in self.settings.wrench.items():
-            if section.frame is not None:
-                axes = "frame" if section.frame == "body" else "world"
-                text = f'{self.path}: wrench.{name}: frame is now axes; write axes = "{axes}"'
-                warnings.warn(printable(text), stacklevel=3)
 
     def ratings(self, model: Model) -> dict[str, Rating]:
         """What the joints may carry, by name. InputError for unknown joints."""

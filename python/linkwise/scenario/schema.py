@@ -233,7 +233,7 @@ class WrenchSection(_Tabled):
     """A force and moment at a point of a link, constant or from a table of six columns.
 
     Where no link is given, the section's name is one. axes: of the components, as in `Wrench`, or
-    roll, pitch, yaw of axes against the link's. frame: the former word.
+    roll, pitch, yaw of axes against the link's.
     """
 
     link: str | None = None
@@ -241,14 +241,9 @@ class WrenchSection(_Tabled):
     axes: Literal["world", "frame"] | Angles | None = None
     force: list[Scalar] | None = Field(default=None, min_length=3, max_length=3)
     moment: list[Scalar] | None = Field(default=None, min_length=3, max_length=3)
-    frame: Literal["world", "body"] | None = None
 
     @model_validator(mode="after")
     def _one(self) -> WrenchSection:
-        if isinstance(self.axes, str) and self.frame is not None:
-            raise ValueError("has axes and frame, which is the former word for it; keep axes")
-        if self.axes is not None and self.frame == "world":
-            raise ValueError('has axes of its own and frame = "world"; keep one of them')
         self._check_table("force or moment", self.force is not None or self.moment is not None)
         if self.columns is not None and len(self.columns) != 6:
             raise ValueError(f"columns has {len(self.columns)} names; name six: fx fy fz nx ny nz")

@@ -11,8 +11,6 @@
 namespace linkwise {
 namespace {
 
-Force<double> times(double x, const Force<double>& w) { return {x * w.lin, x * w.ang}; }
-
 /// Column of P of the joint that a term couples, or -1 where its motion is given.
 int column_of(const Model& model, const Coupling::Term& term) {
   if (term.closes) {
@@ -216,16 +214,16 @@ void GraphSystem::place_term(int c, size_t t) {
   if (term.closes) {
     const LoopState& loop = loops_[term.joint - model_->n_joints()];
     const LoopJoint& at = loop_of(*model_, term);
-    const Force<double> pull = times(slope, to_force(loop.basis.dual[0].data()));
+    const Force<double> pull = slope * to_force(loop.basis.dual[0].data());
     put(node, 0, at.joint.body, wrench_on_b(at, pull));
     put(node, 0, at.parent_body, wrench_on_a(loop, pull));
     ask(node, 0, slope * loop.bias);
     return;
   }
   const BodyState<double>& state = state_[term.body];
-  const Force<double> pull = times(slope, to_force(joint_[term.body].dual[columns_[c][t]].data()));
+  const Force<double> pull = slope * to_force(joint_[term.body].dual[columns_[c][t]].data());
   put(node, 0, term.body, pull);
-  put(node, 0, model_->topology[term.body].parent, times(-1, transpose_times(state.X, pull)));
+  put(node, 0, model_->topology[term.body].parent, -1.0 * transpose_times(state.X, pull));
   ask(node, 0, dot(state.c, pull));
 }
 
@@ -256,7 +254,7 @@ void GraphSystem::apply_loop_torques(const SweepInput<double>& in) {
     const LoopState& loop = loops_[l];
     Force<double>& w = known_of_loop_[l] = {};
     for (int k = 0; k < loop.basis.n; ++k)
-      w += times(tau_[loop.dof[k]], to_force(loop.basis.dual[k].data()));
+      w += tau_[loop.dof[k]] * to_force(loop.basis.dual[k].data());
     const LoopJoint& at = model.loops.joints[l];
     if (at.parent_body >= 0) g_[at.parent_body] += wrench_on_a(loop, w);
     if (at.joint.body >= 0) g_[at.joint.body] += wrench_on_b(at, w);
@@ -277,10 +275,10 @@ void GraphSystem::add_forces(const std::vector<double>& f) {
   const Model& model = *model_;
   for (int n = 0; n < model.n_bodies(); ++n)
     for (int r = 0; r < joint_[n].rows; ++r)
-      w_[n] += times(f[A_.offset[n] + r], to_force(joint_[n].B[r].data()));
+      w_[n] += f[A_.offset[n] + r] * to_force(joint_[n].B[r].data());
   for (int l = 0; l < model.n_loops(); ++l)
     for (int r = 0; r < loops_[l].rows; ++r)
-      loop_w_[l] += times(f[A_.offset[node_of_loop(l)] + r], to_force(loops_[l].row[r].data()));
+      loop_w_[l] += f[A_.offset[node_of_loop(l)] + r] * to_force(loops_[l].row[r].data());
   for (int c = 0; c < model.n_couplings(); ++c)
     for (size_t t = 0; t < slopes_[c].size(); ++t) {
       if (columns_[c][t] < 0) continue;
@@ -288,9 +286,9 @@ void GraphSystem::add_forces(const std::vector<double>& f) {
       const double torque = f[A_.offset[node_of_coupling(c)]] * slopes_[c][t];
       if (term.closes) {
         const int l = term.joint - model.n_joints();
-        loop_w_[l] += times(torque, to_force(loops_[l].basis.dual[0].data()));
+        loop_w_[l] += torque * to_force(loops_[l].basis.dual[0].data());
       } else {
-        w_[term.body] += times(torque, to_force(joint_[term.body].dual[columns_[c][t]].data()));
+        w_[term.body] += torque * to_force(joint_[term.body].dual[columns_[c][t]].data());
       }
     }
 }
@@ -365,9 +363,7 @@ void GraphSystem::calc_motion(const double* du) {
     const BodyTopology& body = model.topology[n];
     Motion<double> a = state_[n].X * (body.parent >= 0 ? a_[body.parent] : ground_);
     a += state_[n].c;
-    const auto add = [&](const Motion<double>& P, double x) {
-      a += Motion<double>{x * P.lin, x * P.ang};
-    };
+    const auto add = [&](const Motion<double>& P, double x) { a += x * P; };
     if (body.general >= 0) {
       const GeneralState<double>& joint = general_[body.general];
       for (int k = 0; k < joint.n; ++k) add(joint.P[k], du[joint.dof[k]]);

@@ -85,7 +85,7 @@ SweepInput<double> AppliedStates::operator[](size_t i) {
   in.v = row.v ? row.v : rest_.data();
   in.tau = row.tau;
   in.external = row.external;
-  in.prescribed = row.du;
+  in.prescribed = row.prescribed;
   in.gravity_factor = row.gravity_factor;
   if (loops_) loops_->add(i, row.loop_tau, in);
   return in;

@@ -214,7 +214,7 @@ void ArticulatedLoops::place_coupling(const SweepInput<double>& in, int g,
     } else if (term.closes) {
       const LoopState& loop = states_[term.joint - model_.n_joints()];
       const Force<double> along = direction(loop.basis.dual[0]);
-      const Force<double> pull{slope * along.lin, slope * along.ang};
+      const Force<double> pull = slope * along;
       add(wrench_on_a(loop, pull));
       add(wrench_on_b(model_.loops.joints[term.joint - model_.n_joints()], pull));
       known = -slope * loop.bias;
@@ -313,8 +313,7 @@ void ArticulatedLoops::reduce_top(int g) {
   }
   for (int i = 0; i < n; ++i) w.rhs[i] = w.r[i] - w.beta[i];
   systems_[g].solve(w.rhs);
-  for (int i = 0; i < n; ++i)
-    more.p -= Force<double>{w.rhs[i] * w.Psi[i].lin, w.rhs[i] * w.Psi[i].ang};
+  for (int i = 0; i < n; ++i) more.p -= w.rhs[i] * w.Psi[i];
   sweeps_.receive(groups_[g].top, more);
 }
 
@@ -360,7 +359,7 @@ void ArticulatedLoops::add_known_wrenches(const SweepInput<double>& in) {
     for (int k = 0; k < loop.basis.n; ++k) {
       const Force<double> dual = direction(loop.basis.dual[k]);
       const double tau = known_tau_[loop.dof[k]];
-      w += Force<double>{tau * dual.lin, tau * dual.ang};
+      w += tau * dual;
     }
     const LoopJoint& at = model_.loops.joints[l];
     if (at.parent_body >= 0) sweeps_.add_wrench(at.parent_body, wrench_on_a(loop, w));
@@ -401,7 +400,7 @@ void ArticulatedLoops::add_to_load(int g, const double* f, std::vector<Force<dou
     for (int i = 0; member.loop >= 0 && i < member.n_rows; ++i) {
       const Force<double> Q = direction(states_[member.loop].row[i]);
       const double x = f[member.row + i];
-      load[member.loop] += Force<double>{x * Q.lin, x * Q.ang};
+      load[member.loop] += x * Q;
     }
   }
 }
@@ -416,7 +415,7 @@ void ArticulatedLoops::add_coupling_to_load(const LoopGroup::Member& member, dou
     const int l = term.joint - model_.n_joints();
     const Force<double> along = direction(states_[l].basis.dual[0]);
     const double torque = f * term.slope(states_.q()[term.q]);
-    load[l] += Force<double>{torque * along.lin, torque * along.ang};
+    load[l] += torque * along;
   }
 }
 
@@ -452,7 +451,7 @@ void ArticulatedLoops::store_loop_loads(double* loads) {
     for (int k = 0; known_tau_ && k < loop.basis.n; ++k) {
       const Force<double> dual = direction(loop.basis.dual[k]);
       const double tau = known_tau_[loop.dof[k]];
-      load[l] += Force<double>{tau * dual.lin, tau * dual.ang};
+      load[l] += tau * dual;
     }
     store_loop_load(l, load[l], loads);
   }
@@ -472,7 +471,7 @@ void ArticulatedLoops::store_stress(int g, const double* f, const double* q, dou
     for (size_t i = 0; i < carrier.rows.size(); ++i) {
       const Force<double>& F = w.columns[carrier.first + i].F;
       const double x = f[carrier.rows[i]];
-      of_body[carrier.body] -= Force<double>{x * F.lin, x * F.ang};
+      of_body[carrier.body] -= x * F;
     }
   store_joint_loads(
       model_, q, [&](int n) { return of_body[n]; }, loads);

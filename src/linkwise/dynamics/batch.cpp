@@ -33,7 +33,7 @@ struct BatchEvaluator::Work {
         count, in,
         [&](const SweepInput<double>& one, size_t i) {
           auto& kernel = made(scalar);
-          if (!kernel.evaluate(one, du + i * nv(), loads ? loads + i * n_load() : nullptr))
+          if (!kernel.evaluate(one, du + i * nv(), loads ? loads + i * load_width() : nullptr))
             failed = kernel.failed_body();
         },
         [&](const SweepInput<Group>& group, size_t i) {
@@ -41,7 +41,7 @@ struct BatchEvaluator::Work {
           if (!kernel.evaluate(group, out_a(), loads ? out_b() : nullptr))
             failed = kernel.failed_body();
           unpack(out_a(), nv(), i, count, du);
-          if (loads) unpack(out_b(), n_load(), i, count, loads);
+          if (loads) unpack(out_b(), load_width(), i, count, loads);
         });
     return failed;
   }
@@ -51,7 +51,7 @@ struct BatchEvaluator::Work {
                      size_t count, const BatchInput& in, std::span<const Cause> causes,
                      double* loads) {
     int failed = -1;
-    const size_t stride = causes.size() * n_load();
+    const size_t stride = causes.size() * load_width();
     std::vector<double> bias;
     if (armature_bias_) bias = biased(count, in, nullptr, -1);
     over_groups(
@@ -61,7 +61,7 @@ struct BatchEvaluator::Work {
           const double* passive = in.passive ? in.passive + i * nv() : nullptr;
           const double* turning = armature_bias_ ? bias.data() + i * nv() : none.data();
           size_t c = 0;
-          const auto out = [&] { return loads + i * stride + c * n_load(); };
+          const auto out = [&] { return loads + i * stride + c * load_width(); };
           if (!each_alone(made(scalar), one, {none.data(), turning, passive}, causes, du.data(),
                           out, [&] { ++c; }))
             failed = scalar->failed_body();
@@ -73,7 +73,7 @@ struct BatchEvaluator::Work {
               armature_bias_ ? pack(bias_, bias.data(), nv(), i, count) : none_.data();
           size_t c = 0;
           const auto store = [&] {
-            unpack(out_b(), n_load(), i, count, loads + c++ * n_load(), stride);
+            unpack(out_b(), load_width(), i, count, loads + c++ * load_width(), stride);
           };
           if (!each_alone(
                   made(on_lanes), group, {none_.data(), turning, passive}, causes, out_a(),
@@ -87,15 +87,16 @@ struct BatchEvaluator::Work {
     over_groups(
         count, in,
         [&](const SweepInput<double>& one, size_t i) {
-          made(inverse_).evaluate(one, one.prescribed, tau ? tau + i * nv() : nullptr,
-                                  loads ? loads + i * n_load() : nullptr);
+          made(inverse_).evaluate(one, in.du ? in.du + i * nv() : nullptr,
+                                  tau ? tau + i * nv() : nullptr,
+                                  loads ? loads + i * load_width() : nullptr);
         },
         [&](const SweepInput<Group>& group, size_t i) {
           made(inverse_lanes_)
-              .evaluate(group, group.prescribed, tau ? out_a() : nullptr,
+              .evaluate(group, pack(du_, in.du, nv(), i, count), tau ? out_a() : nullptr,
                         loads ? out_b() : nullptr);
           if (tau) unpack(out_a(), nv(), i, count, tau);
-          if (loads) unpack(out_b(), n_load(), i, count, loads);
+          if (loads) unpack(out_b(), load_width(), i, count, loads);
         });
     for (size_t i = 0; i < count && armature_bias_ && tau && in.v; ++i)
       add_armature_bias(*model_, in.v + i * nv(), 1, tau + i * nv());
@@ -110,7 +111,7 @@ struct BatchEvaluator::Work {
  private:
   size_t nq() const { return model_->nq(); }
   size_t nv() const { return model_->nv(); }
-  size_t n_load() const { return 6 * static_cast<size_t>(model_->n_joints()); }
+  size_t load_width() const { return 6 * static_cast<size_t>(model_->n_joints()); }
 
   template <class Kernel>
   Kernel& made(std::unique_ptr<Kernel>& kernel) {
@@ -123,7 +124,7 @@ struct BatchEvaluator::Work {
     return out_a_.data();
   }
   Group* out_b() {
-    out_b_.resize(n_load());
+    out_b_.resize(load_width());
     return out_b_.data();
   }
 
@@ -193,8 +194,8 @@ struct BatchEvaluator::Work {
         s.q = in.q + i * nq();
         s.v = in.v ? in.v + i * nv() : nullptr;
         s.tau = in.tau ? in.tau + i * nv() : nullptr;
-        s.prescribed = in.du ? in.du + i * nv() : nullptr;
-        s.external = in.external ? in.external + i * n_load() : nullptr;
+        s.prescribed = in.prescribed ? in.prescribed + i * nv() : nullptr;
+        s.external = in.external ? in.external + i * load_width() : nullptr;
         s.gravity_factor = in.gravity_factor;
         one(s, i);
         return;
@@ -203,8 +204,8 @@ struct BatchEvaluator::Work {
       s.q = pack(q_, in.q, nq(), i, count);
       s.v = pack(v_, in.v, nv(), i, count);
       s.tau = pack(tau_, in.tau, nv(), i, count);
-      s.prescribed = pack(du_, in.du, nv(), i, count);
-      s.external = pack(external_, in.external, n_load(), i, count);
+      s.prescribed = pack(prescribed_, in.prescribed, nv(), i, count);
+      s.external = pack(external_, in.external, load_width(), i, count);
       s.gravity_factor = in.gravity_factor;
       several(s, i);
       i += native_lanes;
@@ -215,7 +216,8 @@ struct BatchEvaluator::Work {
   bool armature_bias_;
   std::unique_ptr<InverseDynamics<double>> inverse_;
   std::unique_ptr<InverseDynamics<Group>> inverse_lanes_;
-  std::vector<Group> q_, v_, tau_, du_, external_, passive_, bias_, none_, out_a_, out_b_;
+  std::vector<Group> q_, v_, tau_, du_, prescribed_, external_, passive_, bias_, none_, out_a_,
+      out_b_;
 };
 
 BatchInput BatchInput::from(const Model& model, size_t first) const {
@@ -227,7 +229,8 @@ BatchInput BatchInput::from(const Model& model, size_t first) const {
   part.q = rows(q, model.nq());
   part.loop_tau = rows(loop_tau, model.loops.nv);
   part.external = rows(external, 6 * static_cast<size_t>(model.n_joints()));
-  for (const double** row : {&part.v, &part.tau, &part.du, &part.passive}) *row = rows(*row, nv);
+  for (const double** row : {&part.v, &part.tau, &part.du, &part.prescribed, &part.passive})
+    *row = rows(*row, nv);
   return part;
 }
 

@@ -12,8 +12,10 @@ namespace linkwise {
 struct BatchInput {
   const double* q = nullptr;
   const double* v = nullptr;
-  const double* tau = nullptr;       ///< forward dynamics
-  const double* du = nullptr;        ///< inverse dynamics; prescribed ones: forward dynamics
+  const double* tau = nullptr;  ///< forward dynamics
+  const double* du = nullptr;   ///< inverse dynamics: accelerations of the motion
+  /// Forward dynamics: accelerations of prescribed degrees of freedom, [nv]; null: zero.
+  const double* prescribed = nullptr;
   const double* loop_tau = nullptr;  ///< torques of loop joints; null: none
   const double* external = nullptr;  ///< [n_joints][6] per system
   double gravity_factor = 1;

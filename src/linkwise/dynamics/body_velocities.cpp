@@ -89,7 +89,7 @@ void BodyVelocities::calc_states(const SweepInput<double>& in, BodyState<double>
       calc_general_state(*model_, body, in, v_parent, state, general[body.general]);
     } else {
       const Motion<double> P = element_column<double>(model_->elements[body.first_element], 0);
-      const Motion<double> relative{in.v[body.v] * P.lin, in.v[body.v] * P.ang};
+      const Motion<double> relative = in.v[body.v] * P;
       state.c = cross(state.X * v_parent, relative);
     }
     state.v = v_[n];

@@ -6,6 +6,7 @@
 #include "linkwise/base/error.hpp"
 #include "linkwise/base/finite.hpp"
 #include "linkwise/base/memory.hpp"
+#include "linkwise/base/named.hpp"
 #include "linkwise/constraint/joint_constraint.hpp"
 #include "linkwise/dynamics/composite_rigid_body.hpp"
 #include "linkwise/dynamics/loop_rates.hpp"
@@ -15,12 +16,16 @@
 namespace linkwise {
 namespace {
 
-constexpr std::pair<std::string_view, Cause> causes[] = {
-    {"gravity", Cause::gravity}, {"velocity", Cause::velocity}, {"drive", Cause::drive},
-    {"motion", Cause::motion},   {"passive", Cause::passive},   {"external", Cause::external}};
+struct CauseEntry {
+  std::string_view name;
+  Cause cause;
+};
+constexpr CauseEntry causes[] = {{"gravity", Cause::gravity}, {"velocity", Cause::velocity},
+                                 {"drive", Cause::drive},     {"motion", Cause::motion},
+                                 {"passive", Cause::passive}, {"external", Cause::external}};
 
 void check_prescribed(const Model& m, const BatchInput& s) {
-  if (s.du && m.spec().prescribed.empty())
+  if (s.prescribed && m.spec().prescribed.empty())
     throw InputError(
         "prescribed: the model has no joint of given motion; use model.prescribe([...])");
 }
@@ -65,17 +70,19 @@ bool rows_finite(const double* results, size_t first, size_t rows, size_t width)
   return !results || all_finite({results + first * width, rows * width});
 }
 
-/// Every state by one method, one after the other.
+/// Every state by one method, one after the other. Of a single one nobody is asked: reading the
+/// clock would take a tenth of its time.
 void one_by_one(const Model& m, DynamicsMethod& method, size_t count, AppliedStates& states,
                 const ForwardOutput& out, DynamicsReport& report, const GoOn& go_on) {
-  const size_t n_load = 6 * static_cast<size_t>(m.n_loads());
+  const size_t load_width = 6 * static_cast<size_t>(m.n_loads());
   const auto finite = [&](size_t i) {
-    return rows_finite(out.acceleration, i, 1, m.nv()) && rows_finite(out.joint_load, i, 1, n_load);
+    return rows_finite(out.acceleration, i, 1, m.nv()) &&
+           rows_finite(out.joint_load, i, 1, load_width);
   };
-  for (size_t i = 0; i < count && go_on(); ++i) {
+  for (size_t i = 0; i < count && (count == 1 || go_on()); ++i) {
     const DynamicsReport r =
         method.evaluate(0, states[i], out.acceleration + i * m.nv(),
-                        out.joint_load ? out.joint_load + i * n_load : nullptr);
+                        out.joint_load ? out.joint_load + i * load_width : nullptr);
     report.loops = r.loops;
     report.iterations = std::max(report.iterations, r.iterations);
     report.error_estimate = std::max(report.error_estimate, r.error_estimate);
@@ -172,17 +179,7 @@ std::string failure_text(const Model& model, const EvaluationReport& report) {
 
 std::vector<Cause> causes_from_names(std::span<const std::string> names) {
   std::vector<Cause> found;
-  for (const std::string& name : names) {
-    const auto* entry = std::find_if(std::begin(causes), std::end(causes),
-                                     [&](const auto& known) { return name == known.first; });
-    if (entry == std::end(causes)) {
-      std::string known;
-      for (const auto& [other, cause] : causes)
-        known += (known.empty() ? "" : ", ") + std::string(other);
-      throw InputError("cause '" + name + "' is unknown; known: " + known);
-    }
-    found.push_back(entry->second);
-  }
+  for (const std::string& name : names) found.push_back(find_named("cause", name, causes).cause);
   return found;
 }
 
@@ -194,11 +191,6 @@ struct Evaluator::Workspace {
   const Choice& default_choice() {
     if (choice.method.empty()) choice = choose_dynamics(model, {});
     return choice;
-  }
-  /// Does one state have a method of its own, not that of a batch?
-  bool is_split() {
-    if (split < 0) split = linkwise::is_split(model);
-    return split > 0;
   }
   /// Made anew only where other options are asked for than at the last call.
   DynamicsMethod& kept_method(const DynamicsOptions& asked) {
@@ -216,7 +208,6 @@ struct Evaluator::Workspace {
   std::unique_ptr<DynamicsMethod> method;
   DynamicsOptions method_options;
   Choice choice;
-  int split = -1;
 };
 
 /// Borrows a workspace and gives it back at the end of its life.
@@ -264,14 +255,14 @@ struct Evaluator::Pick {
 Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const DynamicsOptions& options,
                                 bool forces, Choice& choice) const {
   Pick picked;
-  const bool is_auto = options.method == "auto";
+  const bool is_auto = options.method == "auto",
+             one_by_one = count == 1 || model_->is_constrained();
   // This path builds no text: that would take as long as the dynamics of a small machine.
   if ((is_auto || options.method == "articulated_body") && options.solver == "auto") {
-    const bool alone = model_->is_constrained() || (count == 1 && workspace.is_split());
     const Choice& by_default = workspace.default_choice();
-    choice.method = alone && is_auto ? by_default.method : "articulated_body";
-    if (alone && is_auto) choice.solver = by_default.solver;
-    if (alone)
+    choice.method = one_by_one && is_auto ? by_default.method : "articulated_body";
+    if (one_by_one && is_auto) choice.solver = by_default.solver;
+    if (one_by_one)
       picked.method = &workspace.kept_method(options);
     else if (options.initial_guess != "zero")
       choose_dynamics(*model_, options);  // refuses unknown names
@@ -282,10 +273,11 @@ Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const Dynami
     return picked;
   }
   choice = choose_dynamics(*model_, options);
-  if (count > 1 && !forces && !model_->is_constrained() && choice.method == "constraint_force" &&
-      choice.solver == "thomas" && !ask_for_refinement(options.solver_options)) {
+  const auto on_lanes = find_dynamics(choice.method).on_lanes;
+  if (!one_by_one && !forces && on_lanes && choice.solver == "thomas" &&
+      !ask_for_refinement(options.solver_options)) {
     require_regular_inertias(*model_);
-    picked.on_lanes = BatchMethod::constraint_force;
+    picked.on_lanes = *on_lanes;
   } else {
     picked.own = make_dynamics(*model_, options);
     picked.method = picked.own.get();
@@ -371,8 +363,8 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
   if (method != "articulated_body" && method != "constraint_force")
     throw InputError("method '" + method +
                      "' does not split loads; use articulated_body or constraint_force");
-  const bool by_force = method == "constraint_force";
-  require_known_bodies(m, find_dynamics(method));
+  const DynamicsEntry& by = find_dynamics(method);
+  require_known_bodies(m, by);
   if (m.is_constrained()) {
     DynamicsOptions options;
     options.method = method;
@@ -382,7 +374,7 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
                      go_on);
     return evaluation_report(m, {method, "", ""}, report);
   }
-  if (by_force) require_regular_inertias(m);
+  if (by.uses_solver) require_regular_inertias(m);
   BatchInput s = states;
   std::vector<double> passive;
   if (std::find(causes.begin(), causes.end(), Cause::passive) != causes.end()) {
@@ -393,9 +385,8 @@ EvaluationReport Evaluator::loads_by_cause(size_t count, const BatchInput& state
   PartsReport parts;
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);
-    const int failed = workspace->batch.loads_by_cause(
-        n, s.from(m, first), causes, loads + first * width,
-        by_force ? BatchMethod::constraint_force : BatchMethod::articulated_body);
+    const int failed = workspace->batch.loads_by_cause(n, s.from(m, first), causes,
+                                                       loads + first * width, *by.on_lanes);
     parts.add(failed, rows_finite(loads, first, n, width));
   });
   DynamicsReport report;
@@ -434,7 +425,7 @@ void Evaluator::driven_inverse(size_t count, const BatchInput& states,
   require_determined(m);
   DrivenInverse kernel(m, driven);
   BatchInput acting = states;
-  acting.tau = acting.du = nullptr;
+  acting.tau = nullptr;
   AppliedStates applied(m, count, acting);
   const std::vector<double> rest(m.nv());
   const auto row = [](double* x, size_t i, size_t n) { return x ? x + i * n : nullptr; };

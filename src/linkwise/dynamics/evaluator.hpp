@@ -2,8 +2,8 @@
 // Everything that is computed of given states: accelerations and joint loads, torques of a motion,
 // loads by cause. One place decides what computes them, by what was asked for and how many states
 // there are:
-//     one state     the method of the table that "auto" stands for: split into pieces, paths or
-//                   branches where the machine is large enough, plain otherwise
+//     one state     the method of the table that was asked for, or that "auto" stands for; the
+//                   method itself splits large machines into pieces, paths or branches
 //     many states   articulated_body, or constraint_force with thomas, on SIMD lanes; machines with
 //                   loops one state in each thread; every other method state by state
 #include <array>

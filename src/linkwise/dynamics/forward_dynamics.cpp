@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/base/named.hpp"
 #include "linkwise/dynamics/articulated_body.hpp"
 #include "linkwise/dynamics/articulated_loops.hpp"
 #include "linkwise/dynamics/articulated_paths.hpp"
@@ -119,25 +120,47 @@ std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model,
   return std::make_unique<ConstraintForce>(model, options);
 }
 
-// name, description, reference, uses a solver, chains only, any body, linear time, loops
 constexpr DynamicsEntry table[] = {
-    {"articulated_body", "recursion with articulated inertias, O(N)", "featherstone1983", false,
-     false, true, true, true, make_articulated_body},
-    {"constraint_force", "joint constraint forces from A f = b with any linear solver", "sharf1993",
-     true, false, false, true, true, make_constraint_force},
-    {"piecewise",
-     "one long revolute chain in pieces: recursion inside, constraint forces between, on lanes and "
-     "threads",
-     "anderson2000", true, true, false, true, false, make_method<Piecewise>},
-    {"composite_rigid_body",
-     "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)", "walker1982", false,
-     false, true, false, false, make_recursion<CompositeRigidBody>},
-    {"joint_space_conjugate_gradient",
-     "conjugate gradients on the joint-space mass matrix, one inverse dynamics per iteration",
-     "lee1988", false, false, true, false, false, make_method<JointSpaceConjugateGradient>},
-    {"global_projection",
-     "all bodies' motion equations projected on what the joints let through, O(N^3)", "hughes1985",
-     false, false, true, false, false, make_recursion<GlobalProjection>},
+    {.name = "articulated_body",
+     .description = "recursion with articulated inertias, O(N)",
+     .reference = "featherstone1983",
+     .any_body = true,
+     .linear_time = true,
+     .takes_loops = true,
+     .on_lanes = BatchMethod::articulated_body,
+     .make = make_articulated_body},
+    {.name = "constraint_force",
+     .description = "joint constraint forces from A f = b with any linear solver",
+     .reference = "sharf1993",
+     .uses_solver = true,
+     .linear_time = true,
+     .takes_loops = true,
+     .on_lanes = BatchMethod::constraint_force,
+     .make = make_constraint_force},
+    {.name = "piecewise",
+     .description = "one long revolute chain in pieces: recursion inside, constraint forces "
+                    "between, on lanes and threads",
+     .reference = "anderson2000",
+     .uses_solver = true,
+     .chains_only = true,
+     .linear_time = true,
+     .make = make_method<Piecewise>},
+    {.name = "composite_rigid_body",
+     .description = "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)",
+     .reference = "walker1982",
+     .any_body = true,
+     .make = make_recursion<CompositeRigidBody>},
+    {.name = "joint_space_conjugate_gradient",
+     .description = "conjugate gradients on the joint-space mass matrix, one inverse dynamics per "
+                    "iteration",
+     .reference = "lee1988",
+     .any_body = true,
+     .make = make_method<JointSpaceConjugateGradient>},
+    {.name = "global_projection",
+     .description = "all bodies' motion equations projected on what the joints let through, O(N^3)",
+     .reference = "hughes1985",
+     .any_body = true,
+     .make = make_recursion<GlobalProjection>},
 };
 
 /// A method on a machine with armatures whose axes turn.
@@ -168,12 +191,7 @@ class WithArmatureBias final : public DynamicsMethod {
 std::span<const DynamicsEntry> dynamics_table() { return table; }
 
 const DynamicsEntry& find_dynamics(std::string_view name) {
-  std::string known = "auto";
-  for (const DynamicsEntry& entry : table) {
-    if (entry.name == name) return entry;
-    known += ", " + std::string(entry.name);
-  }
-  throw InputError("method '" + std::string(name) + "' is unknown; known: " + known);
+  return find_named("method", name, table, "auto");
 }
 
 std::string rounded(double x) {
@@ -250,11 +268,6 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
                        "the bearings");
   }
   return choice;
-}
-
-bool is_split(const Model& model) {
-  return model.is_constrained() || choose_dynamics(model, {}).method == "piecewise" ||
-         paths_fill(model, native_lanes) || Branches(model).any();
 }
 
 std::unique_ptr<DynamicsMethod> make_dynamics(const Model& model, const DynamicsOptions& options) {

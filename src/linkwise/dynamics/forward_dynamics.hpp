@@ -2,10 +2,12 @@
 // The table of dynamics methods: ways from (q, v, tau) to accelerations and joint loads. A new
 // method is one file and one line. Command line, Python, tests and benchmarks read the table.
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "linkwise/dynamics/batch.hpp"
 #include "linkwise/dynamics/loop_report.hpp"
 #include "linkwise/kinematics/body_state.hpp"
 #include "linkwise/solve/initial_guess.hpp"
@@ -47,11 +49,13 @@ struct DynamicsEntry {
   std::string_view name;
   std::string_view description;
   std::string_view reference;  ///< key in references.bib
-  bool uses_solver;
-  bool chains_only;  ///< takes one kind of machine; the others take every tree
-  bool any_body;     ///< takes bodies of every kind; the others take rigid ones
-  bool linear_time;  ///< the work grows as the number of bodies; the others are for short chains
-  bool takes_loops;  ///< takes machines whose joints close loops; the others take trees
+  bool uses_solver = false;
+  bool chains_only = false;  ///< takes one kind of machine; the others take every tree
+  bool any_body = false;     ///< takes bodies of every kind; the others take rigid ones
+  bool linear_time = false;  ///< work grows as the number of bodies; others: for short chains
+  bool takes_loops = false;  ///< takes machines whose joints close loops; the others take trees
+  /// What computes many states of a tree side by side, where no solver but thomas is asked for.
+  std::optional<BatchMethod> on_lanes = {};
   std::unique_ptr<DynamicsMethod> (*make)(const Model&, const DynamicsOptions&);
 };
 
@@ -67,9 +71,6 @@ struct Choice {
   std::string method, solver, reason;
 };
 Choice choose_dynamics(const Model& model, const DynamicsOptions& options);
-
-/// Does "auto" split one system of this model into pieces, paths or branches, for lanes or threads?
-bool is_split(const Model& model);
 
 /// Resolves "auto" and makes the method.
 std::unique_ptr<DynamicsMethod> make_dynamics(const Model& model, const DynamicsOptions& options);

@@ -58,7 +58,7 @@ void JointSpaceConjugateGradient::multiply(std::span<const double> x, std::span<
     if (parent >= 0) a = columns_.state(n).X * a_[parent];
     for (int k = columns_.first(n); k < columns_.first(n + 1); ++k) {
       const Motion<double>& P = columns_.P(k);
-      a += Motion<double>{x[k] * P.lin, x[k] * P.ang};
+      a += x[k] * P;
     }
     a_[n] = a;
     w_[n] = with_body(model, n, [&](const auto& body) { return inertia_times(body, a); });

@@ -29,7 +29,7 @@ Matrix6<double> transform_to_child(const Transform<double>& X, const Matrix6<dou
 
 /// (H^-1)_kk of a column; W of what carries it becomes W of what it carries.
 double let_move(const EliminatedAxis<double>& axis, const Motion<double>& P, Matrix6<double>& W) {
-  const Force<double> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};
+  const Force<double> V = axis.D_inverse * axis.U;
   const Motion<double> given = W * V;
   const double mobility = axis.D_inverse + dot(given, V);
   const Vector6<double> p = to_array(P), g = to_array(given);

@@ -122,8 +122,8 @@ Breakpoints breakpoints(const Wrench& wrench, double tolerance, double largest) 
 }
 
 Wrench wrench_at(const Model& model, const Frame& frame, const std::string& axes) {
-  if (axes != "world" && axes != "body")
-    throw InputError("frame '" + axes + "' is unknown; known: world, body");
+  if (axes != "world" && axes != "frame")
+    throw InputError("axes '" + axes + "' are unknown; known: world, frame");
   const FramePlacement place = place_frame(model, frame);
   if (place.joint < 0)
     throw InputError("link '" + frame.link + "'" + model.where() +

@@ -75,7 +75,7 @@ Breakpoints breakpoints(const Wrench& wrench, double tolerance, double largest);
 double largest_action(const Drive& drive);
 double largest_action(const Wrench& wrench);
 
-/// A wrench without its value yet. axes: "world", or "body" for those of the frame where it acts.
+/// A wrench without its value yet. axes: "world", or "frame" for those of the one where it acts.
 /// InputError where the axes are unknown or the frame is on the ground.
 Wrench wrench_at(const Model& model, const Frame& frame, const std::string& axes);
 

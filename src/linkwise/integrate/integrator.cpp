@@ -5,6 +5,7 @@
 #include <string>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/base/named.hpp"
 
 namespace linkwise {
 
@@ -16,32 +17,37 @@ namespace {
 
 constexpr IntegratorEntry entries[] = {
 #if defined(LINKWISE_WITH_SUNDIALS)
-    {"auto", "adams, and bdf where the motion turns out to be stiff", false, 12, make_auto},
-    {"adams",
-     "variable-order Adams, 1 to 12, functional iteration (CVODE); for motion that is not stiff",
-     false, 12, make_adams},
-    {"bdf",
-     "variable-order backward differentiation, 1 to 5, Newton iteration (CVODE); for stiff springs "
-     "and stops",
-     false, 5, make_bdf},
+    {.name = "auto",
+     .description = "adams, and bdf where the motion turns out to be stiff",
+     .highest_order = 12,
+     .make = make_auto},
+    {.name = "adams",
+     .description = "variable-order Adams, 1 to 12, functional iteration (CVODE); for motion that "
+                    "is not stiff",
+     .highest_order = 12,
+     .make = make_adams},
+    {.name = "bdf",
+     .description = "variable-order backward differentiation, 1 to 5, Newton iteration (CVODE); "
+                    "for stiff springs and stops",
+     .highest_order = 5,
+     .make = make_bdf},
 #endif
-    {"runge_kutta_8",
-     "Runge-Kutta of order 8 (Dormand and Prince); without a history, to check the others by",
-     false, 8, make_runge_kutta_8},
-    {"runge_kutta_4", "classical Runge-Kutta of order 4 with a fixed step; no error control", true,
-     4, make_runge_kutta_4},
-    {"semi_implicit_euler", "semi-implicit Euler of order 1 with a fixed step; no error control",
-     true, 1, make_semi_implicit_euler},
+    {.name = "runge_kutta_8",
+     .description =
+         "Runge-Kutta of order 8 (Dormand and Prince); without a history, to check the others by",
+     .highest_order = 8,
+     .make = make_runge_kutta_8},
+    {.name = "runge_kutta_4",
+     .description = "classical Runge-Kutta of order 4 with a fixed step; no error control",
+     .highest_order = 4,
+     .fixed_step = true,
+     .make = make_runge_kutta_4},
+    {.name = "semi_implicit_euler",
+     .description = "semi-implicit Euler of order 1 with a fixed step; no error control",
+     .highest_order = 1,
+     .fixed_step = true,
+     .make = make_semi_implicit_euler},
 };
-
-std::string known_names() {
-  std::string names;
-  for (const IntegratorEntry& entry : entries) {
-    if (!names.empty()) names += ", ";
-    names += entry.name;
-  }
-  return names;
-}
 
 [[noreturn]] void reject(std::string_view option, double value, std::string_view rule) {
   char number[32];
@@ -97,8 +103,7 @@ const IntegratorEntry& find_integrator(std::string_view name) {
 #else
   constexpr std::string_view why = "; this build has no SUNDIALS, hence no auto, adams and bdf";
 #endif
-  throw InputError("unknown integrator '" + std::string(name) + "'; known are " + known_names() +
-                   std::string(why));
+  throw InputError(unknown_name("integrator", name, entries) + std::string(why));
 }
 
 std::string fixed_step_names() {

@@ -120,8 +120,8 @@ class Integrator {
 struct IntegratorEntry {
   std::string_view name;
   std::string_view description;
-  bool fixed_step;
   int highest_order;
+  bool fixed_step = false;
   std::unique_ptr<Integrator> (*make)(OdeSystem&, const IntegratorOptions&);
 };
 

@@ -126,7 +126,7 @@ struct HelicalJoint {
   LW_INLINE static Force<S> column(const ArticulatedInertia<S>& Y, C pitch) {
     Force<S> u = RevoluteJoint::column(Y, pitch);
     const Force<S> along = PrismaticJoint::column(Y, pitch);
-    u += Force<S>{pitch * along.lin, pitch * along.ang};
+    u += pitch * along;
     return u;
   }
 };

@@ -51,10 +51,10 @@ void calc_general_state(std::span<const Element> stack, const SweepInput<S>& in,
     for (int k = 0; k < e.nv; ++k) {
       const Motion<S> column = element_column<S>(e, k);
       const S u = in.v ? in.v[e.v + k] : S{};
-      relative += Motion<S>{u * column.lin, u * column.ang};
+      relative += u * column;
       if (e.prescribed) {
         const S a = in.prescribed ? in.prescribed[e.v + k] : S{};
-        c += Motion<S>{a * column.lin, a * column.ang};
+        c += a * column;
       } else {
         general.dof[general.n] = e.v + k;
         general.P[general.n++] = column;

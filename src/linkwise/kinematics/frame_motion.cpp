@@ -39,9 +39,8 @@ FrameMotion frame_motion(const Model& model, const double* q, const double* v, c
     Motion<double> own{}, change{};  // P u, constant columns P, and P du
     for (int k = 0; k < element.nv; ++k) {
       const auto column = element_column<double>(element, k);
-      if (v) own += Motion<double>{v[element.v + k] * column.lin, v[element.v + k] * column.ang};
-      if (du)
-        change += Motion<double>{du[element.v + k] * column.lin, du[element.v + k] * column.ang};
+      if (v) own += v[element.v + k] * column;
+      if (du) change += du[element.v + k] * column;
     }
     at.pose = X * at.pose;
     at.velocity = X * at.velocity;

@@ -2,7 +2,7 @@
 
 #include <sstream>
 
-#include "linkwise/base/error.hpp"
+#include "linkwise/base/named.hpp"
 
 namespace linkwise {
 
@@ -78,12 +78,7 @@ int joint_dof(const JointSpec& joint) {
 }
 
 JointType joint_type_from_name(const std::string& name) {
-  std::string known;
-  for (const JointTypeInfo& entry : joint_type_table) {
-    if (name == entry.name) return entry.type;
-    known += (known.empty() ? "" : ", ") + std::string(entry.name);
-  }
-  throw InputError("joint type '" + name + "' is unknown; known: " + known);
+  return find_named("joint type", name, joint_type_table).type;
 }
 
 std::vector<ScalarLabel> coordinate_labels(const JointSpec& joint) {

@@ -34,7 +34,7 @@ class StackConstraint {
       const int dof = joint_.dof[i];
       if (armature[dof] > 0) continue;
       const Force<S> one = to_force(joint_.dual[i].data());
-      known_ += Force<S>{tau[dof] * one.lin, tau[dof] * one.ang};
+      known_ += tau[dof] * one;
     }
     on_body += known_;
     if (on_parent) *on_parent -= transpose_times(X_, known_);
@@ -79,7 +79,7 @@ class StackConstraint {
     Force<S> r{};
     for (int i = 0; i < joint_.rows; ++i) {
       const Force<S> B = to_force(joint_.B[i].data());
-      r += Force<S>{f[i] * B.lin, f[i] * B.ang};
+      r += f[i] * B;
     }
     return r;
   }
@@ -98,7 +98,7 @@ class StackConstraint {
     for (int i = 0; i < joint_.free; ++i) {
       const S rate = dot(gap, to_force(joint_.dual[i].data()));
       du[joint_.dof[i]] = rate;
-      a += Motion<S>{rate * columns_.P[i].lin, rate * columns_.P[i].ang};
+      a += rate * columns_.P[i];
     }
     return a;
   }

@@ -27,7 +27,7 @@ LW_INLINE int carry(const EliminatedAxis<S>& axis, const Motion<S>& c, double pi
   column.z[0] += J::project(column.F, pitch);
   const S y = column.z[0] * axis.D_inverse;
   column.y[0] = y;
-  column.F -= Force<S>{y * axis.U.lin, y * axis.U.ang};
+  column.F -= y * axis.U;
   column.beta = y * axis.h + dot(c, column.F);
   return 1;
 }
@@ -43,7 +43,7 @@ int carry(const GeneralState<S>& joint, const EliminatedStack<S>& stack, const M
   column.beta = S{};
   for (int k = 0; k < joint.n; ++k) {
     const S y = column.y[k];
-    column.F -= Force<S>{y * stack.U[k].lin, y * stack.U[k].ang};
+    column.F -= y * stack.U[k];
     column.beta += y * stack.h[k];
   }
   column.beta += dot(c, column.F);
@@ -75,7 +75,7 @@ LW_INLINE void apply(const LoopColumn<S>& column, const S& f, int n, EliminatedS
 template <class S>
 LW_INLINE void apply(const LoopColumn<S>& column, const S& f, EliminatedFree<S>& free) {
   const Motion<S> y = to_motion(column.y);
-  free.a += Motion<S>{f * y.lin, f * y.ang};
+  free.a += f * y;
 }
 
 }  // namespace linkwise

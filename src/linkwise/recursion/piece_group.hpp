@@ -122,7 +122,7 @@ class PieceGroup {
     PieceMotion<S> motion;
     Motion<S> a = answer.a_free;
     for (int j = 0; j < cut_rows; ++j) {
-      a += Motion<S>{f.first[j] * answer.JQ[j].lin, f.first[j] * answer.JQ[j].ang};
+      a += f.first[j] * answer.JQ[j];
       a += Motion<S>{-f.outboard[j] * answer.JPsi[j].lin, -f.outboard[j] * answer.JPsi[j].ang};
     }
     motion.first = a;

@@ -57,16 +57,16 @@ LW_INLINE void reduce(int n_columns, const EliminatedStack<S>& stack, const Moti
     Force<S> column = stack.U[i];
     S y = stack.h[i];
     for (int l = 0; l < i; ++l) {
-      column -= Force<S>{stack.L[packed(i, l)] * W[l].lin, stack.L[packed(i, l)] * W[l].ang};
+      column -= stack.L[packed(i, l)] * W[l];
       y = y - stack.L[packed(i, l)] * z[l];
     }
     const S r = stack.L[packed(i, i)];
-    W[i] = {r * column.lin, r * column.ang};
+    W[i] = r * column;
     z[i] = r * y;
     subtract_outer(Y, W[i], W[i]);
   }
   p += Y * c;
-  for (int i = 0; i < n_columns; ++i) p += Force<S>{z[i] * W[i].lin, z[i] * W[i].ang};
+  for (int i = 0; i < n_columns; ++i) p += z[i] * W[i];
 }
 
 /// h and pa, in the place of p, for another right-hand side.
@@ -77,7 +77,7 @@ LW_INLINE void respond(const GeneralState<S>& joint, const ArticulatedInertia<S>
   for (int i = 0; i < joint.n; ++i) y[i] = stack.h[i] = tau[joint.dof[i]] - dot(joint.P[i], p);
   cholesky_solve(joint.n, stack.L, y);
   p += Ya * c;
-  for (int i = 0; i < joint.n; ++i) p += Force<S>{y[i] * stack.U[i].lin, y[i] * stack.U[i].ang};
+  for (int i = 0; i < joint.n; ++i) p += y[i] * stack.U[i];
 }
 
 /// a += P du. du: those of all joints.
@@ -85,7 +85,7 @@ template <class S>
 LW_INLINE void add_rates(const GeneralState<S>& joint, const S* du, Motion<S>& a) {
   for (int i = 0; i < joint.n; ++i) {
     const S rate = du[joint.dof[i]];
-    a += Motion<S>{rate * joint.P[i].lin, rate * joint.P[i].ang};
+    a += rate * joint.P[i];
   }
 }
 

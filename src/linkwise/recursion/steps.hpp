@@ -95,7 +95,7 @@ LW_INLINE S eliminate(const ArticulatedInertia<S>& Y, const Force<S>& p, const A
 /// Ya in the place of Y; returns U / D.
 template <class S>
 LW_INLINE Force<S> reduce_inertia(const EliminatedAxis<S>& axis, ArticulatedInertia<S>& Y) {
-  const Force<S> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};
+  const Force<S> V = axis.D_inverse * axis.U;
   subtract_outer(Y, V, axis.U);
   return V;
 }
@@ -105,13 +105,13 @@ template <class J, class S>
 LW_INLINE void reduce(const ArticulatedInertia<S>& Y, const EliminatedAxis<S>& axis,
                       const Motion<S>& c, ReducedInertia<J, S>& Ya, Force<S>& p) {
   if constexpr (J::leaves_zero_row) {
-    const Force<S> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};
+    const Force<S> V = axis.D_inverse * axis.U;
     eliminate_turn(Y, axis.U, V, c, axis.h, Ya, p);
   } else {
     Ya = Y;
     const Force<S> V = reduce_inertia(axis, Ya);
     p += Ya * c;
-    p += Force<S>{axis.h * V.lin, axis.h * V.ang};
+    p += axis.h * V;
   }
 }
 
@@ -124,7 +124,7 @@ LW_INLINE void respond(const ReducedInertia<J, S>& Ya, const Motion<S>& c, doubl
   axis.h = h;
   if constexpr (moving) p += Ya * c;
   const S rate = axis.D_inverse * h;
-  p += Force<S>{rate * axis.U.lin, rate * axis.U.ang};
+  p += rate * axis.U;
 }
 
 /// The joint load w = Ya X a_p + pa from the parent's acceleration a = X a_p, seen at the body.
@@ -176,12 +176,12 @@ LW_INLINE void carry_cut_forces(const Place& place, const EliminatedAxis<S>& axi
     for (int j = 0; j <= i; ++j) cut.Lambda[packed(i, j)] += scaled * cut.Psi[j].ang.z;
     cut.beta[i] += scaled * axis.h;
   }
-  const Force<S> V{axis.D_inverse * axis.U.lin, axis.D_inverse * axis.U.ang};
+  const Force<S> V = axis.D_inverse * axis.U;
 #pragma GCC unroll 5
   for (int i = 0; i < cut_rows; ++i) {
     Force<S>& Psi = cut.Psi[i];
     const S r = Psi.ang.z;
-    Psi -= Force<S>{r * V.lin, r * V.ang};
+    Psi -= r * V;
     cut.beta[i] +=
         Psi.lin.x * c.lin.x + Psi.lin.y * c.lin.y + Psi.ang.x * c.ang.x + Psi.ang.y * c.ang.y;
     Psi = place.to_parent(Psi);

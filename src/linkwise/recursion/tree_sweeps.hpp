@@ -243,7 +243,7 @@ class TreeSweeps {
           apply(columns[i], f[i], body_[n].axis);
         }
         const Force<S>& F = columns[i].F;
-        if (with_loads) reduced_[n].p -= Force<S>{f[i] * F.lin, f[i] * F.ang};
+        if (with_loads) reduced_[n].p -= f[i] * F;
       }
     });
   }

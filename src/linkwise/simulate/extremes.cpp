@@ -196,7 +196,7 @@ void Extremes::evaluate(std::span<const size_t> rows) {
   in.q = s.q.data();
   in.v = s.v.data();
   in.tau = s.tau.data();
-  in.du = given ? s.given.data() : nullptr;
+  in.prescribed = given ? s.given.data() : nullptr;
   in.external = outside ? s.external.data() : nullptr;
   if (dynamics_->forward_dynamics(systems, in, s.du.data(), s.loads.data()) >= 0)
     for (size_t k = 0; k < n; ++k)

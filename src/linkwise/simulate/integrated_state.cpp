@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "linkwise/base/error.hpp"
+#include "linkwise/base/named.hpp"
 #include "linkwise/simulate/body_velocity_state.hpp"
 
 namespace linkwise {
@@ -21,13 +21,8 @@ constexpr StateEntry table[] = {
 }  // namespace
 
 const StateEntry* find_state(std::string_view name) {
-  std::string known = "joint_rates";
-  if (name == known) return nullptr;
-  for (const StateEntry& entry : table) {
-    if (entry.name == name) return &entry;
-    known += ", " + std::string(entry.name);
-  }
-  throw InputError("state '" + std::string(name) + "' is unknown; known: " + known);
+  constexpr std::string_view usual = "joint_rates";
+  return name == usual ? nullptr : &find_named("state", name, table, usual);
 }
 
 }  // namespace linkwise

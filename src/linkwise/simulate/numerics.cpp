@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/base/named.hpp"
 
 namespace linkwise {
 namespace {
@@ -49,12 +50,7 @@ bool positive(double x) { return x > 0 && std::isfinite(x); }
 std::span<const NumericsEntry> numerics_table() { return table; }
 
 const NumericsEntry& find_numerics(std::string_view name) {
-  std::string known;
-  for (const NumericsEntry& entry : table) {
-    if (entry.name == name) return entry;
-    known += (known.empty() ? "" : ", ") + std::string(entry.name);
-  }
-  throw InputError("unknown option '" + std::string(name) + "'; known: " + known);
+  return find_named("option", name, table);
 }
 
 SimulationOptions simulation_options(const Numerics& n, const Executor& executor,

@@ -144,7 +144,7 @@ BatchInput Simulation::rows(const double* y, size_t member) const {
   in.q = y + member * nq();
   in.v = rates_in(y) + member * nv();
   in.tau = forces_->tau(member);
-  in.du = setup_->any_given() ? given_.data() + member * nv() : nullptr;
+  in.prescribed = setup_->any_given() ? given_.data() + member * nv() : nullptr;
   in.external = forces_->external(member);
   return in;
 }
@@ -169,7 +169,7 @@ Outcome Simulation::on_lanes(double t, const double* y, double* du, double* load
     double* row = du + i * nv();
     const int body = sound ? -1
                            : lanes_->forward_dynamics(1, rows(y, i), row,
-                                                      loads ? loads + i * n_load() : nullptr);
+                                                      loads ? loads + i * load_width() : nullptr);
     bool finite = true;
     for (size_t k = 0; k < nv(); ++k) finite &= std::abs(row[k]) < largest_acceleration;
     if (body >= 0)
@@ -472,7 +472,7 @@ bool Simulation::powers(double t, double* out) {
     const long iterations = iterations_;
     const Ending failure = failure_;
     du_.resize(members_ * nv());
-    work_loads_.resize(loops_ ? n_load() : 0);
+    work_loads_.resize(loops_ ? load_width() : 0);
     known = accelerations(work_method_.get(), t, y_.data(), du_.data(),
                           loops_ ? work_loads_.data() : nullptr) == Outcome::converged;
     iterations_ = iterations;
@@ -493,7 +493,7 @@ bool Simulation::powers(double t, double* out) {
 Outcome Simulation::evaluate_sample(double t, bool with_loads) {
   du_.resize(members_ * nv());
   with_loads |= loops_ && setup_->any_given();  // which give the torques that hold joints
-  loads_.resize(with_loads ? members_ * n_load() : 0);
+  loads_.resize(with_loads ? members_ * load_width() : 0);
   if (any_ended()) stand_in(y_.data());
   const long iterations = iterations_;
   double* loads = with_loads ? loads_.data() : nullptr;
@@ -525,7 +525,7 @@ bool Simulation::write_sample(double t, const Sample& sample) {
                      y_.data() + i * nq(),
                      rates_in(y_.data()) + i * nv(),
                      du_.data() + i * nv(),
-                     loads_.data() + i * n_load(),
+                     loads_.data() + i * load_width(),
                      forces_->drive(i),
                      forces_->external(i),
                      work_ ? work_->of(i) : nullptr,

@@ -106,7 +106,7 @@ class Simulation : private OdeSystem {
  private:
   size_t nq() const { return setup_->model->nq(); }
   size_t nv() const { return setup_->model->nv(); }
-  size_t n_load() const { return 6 * static_cast<size_t>(setup_->model->n_loads()); }
+  size_t load_width() const { return 6 * static_cast<size_t>(setup_->model->n_loads()); }
   double* rates_in(double* y) const { return y + members_ * nq(); }
   const double* rates_in(const double* y) const { return y + members_ * nq(); }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "linkwise/base/error.hpp"
+#include "linkwise/base/named.hpp"
 #include "linkwise/linear/vector.hpp"
 
 namespace linkwise {
@@ -152,12 +152,7 @@ std::span<const InitialGuessEntry> initial_guess_table() { return table; }
 
 std::unique_ptr<InitialGuess> make_initial_guess(std::string_view name,
                                                  const OptionValues& options) {
-  std::string known;
-  for (const InitialGuessEntry& entry : table) {
-    if (entry.name == name) return entry.make(options);
-    known += (known.empty() ? " " : ", ") + std::string(entry.name);
-  }
-  throw InputError("unknown initial guess '" + std::string(name) + "'; known are" + known);
+  return find_named("initial guess", name, table).make(options);
 }
 
 }  // namespace linkwise

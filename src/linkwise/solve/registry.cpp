@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "linkwise/base/error.hpp"
+#include "linkwise/base/named.hpp"
 #include "linkwise/solve/initial_guess.hpp"
 
 namespace linkwise {
@@ -22,41 +22,108 @@ namespace {
 
 using enum SolverKind;
 
-// name, description, kind, chains only, loops, parallel, reference, factory, own options
 constexpr SolverEntry table[] = {
-    {"thomas",
-     "block elimination, leaf to root, hubs in linear time; of closed loops by least degree",
-     direct, false, true, false, "golub2013", make_thomas, direct_options},
-    {"twisted", "block elimination from both ends of a chain", direct, true, false, false,
-     "babuska1972", make_twisted, direct_options},
-    {"cyclic_reduction", "block elimination of every second node, log2 N times", direct, true,
-     false, true, "heller1976", make_cyclic_reduction, direct_options},
-    {"conjugate_gradient", "conjugate gradients, preconditioned by the block diagonal (J-CG)",
-     iterative, false, true, true, "sharf1993", make_conjugate_gradient,
-     conjugate_gradient_options},
-    {"jacobi", "block Jacobi", iterative, false, false, true, "sharf1993", make_jacobi},
-    {"gauss_seidel", "block Gauss-Seidel, base to tip", iterative, false, false, false, "sharf1993",
-     make_gauss_seidel},
-    {"sor", "block successive over-relaxation, base to tip", iterative, false, false, false,
-     "sharf1993", make_sor, sor_options},
-    {"chebyshev", "Chebyshev acceleration of block Jacobi (J-SI)", iterative, false, false, true,
-     "sharf1993", make_chebyshev, chebyshev_options},
-    {"red_black_gauss_seidel", "block Gauss-Seidel, every second node at once", iterative, false,
-     false, true, "hageman1981", make_red_black_gauss_seidel},
-    {"red_black_sor", "block successive over-relaxation, every second node at once", iterative,
-     false, false, true, "hageman1981", make_red_black_sor, red_black_sor_options},
-    {"rs_conjugate_gradient", "conjugate gradients with every second node eliminated (RS-CG)",
-     iterative, false, false, true, "hageman1981", make_rs_conjugate_gradient},
-    {"symmetric_stair_conjugate_gradient", "conjugate gradients, symmetric stair preconditioner",
-     iterative, false, false, true, "bu2024", make_symmetric_stair_conjugate_gradient},
-    {"block_schwarz_conjugate_gradient",
-     "conjugate gradients, exact solves on pieces of block_size joints", iterative, false, false,
-     true, "smith1996", make_block_schwarz_conjugate_gradient, pieces_options},
-    {"two_level",
-     "conjugate gradients, exact solves on pieces and a coarse space of their coupling", iterative,
-     false, false, true, "tang2009", make_two_level, pieces_options},
-    {"lagged_thomas", "conjugate gradients, preconditioned by the factor of an earlier system",
-     iterative, false, false, false, "golub2013", make_lagged_thomas, lagged_thomas_options},
+    {.name = "thomas",
+     .description =
+         "block elimination, leaf to root, hubs in linear time; of closed loops by least degree",
+     .kind = direct,
+     .reference = "golub2013",
+     .takes_loops = true,
+     .make = make_thomas,
+     .options = direct_options},
+    {.name = "twisted",
+     .description = "block elimination from both ends of a chain",
+     .kind = direct,
+     .reference = "babuska1972",
+     .chains_only = true,
+     .make = make_twisted,
+     .options = direct_options},
+    {.name = "cyclic_reduction",
+     .description = "block elimination of every second node, log2 N times",
+     .kind = direct,
+     .reference = "heller1976",
+     .chains_only = true,
+     .parallel = true,
+     .make = make_cyclic_reduction,
+     .options = direct_options},
+    {.name = "conjugate_gradient",
+     .description = "conjugate gradients, preconditioned by the block diagonal (J-CG)",
+     .kind = iterative,
+     .reference = "sharf1993",
+     .takes_loops = true,
+     .parallel = true,
+     .make = make_conjugate_gradient,
+     .options = conjugate_gradient_options},
+    {.name = "jacobi",
+     .description = "block Jacobi",
+     .kind = iterative,
+     .reference = "sharf1993",
+     .parallel = true,
+     .make = make_jacobi},
+    {.name = "gauss_seidel",
+     .description = "block Gauss-Seidel, base to tip",
+     .kind = iterative,
+     .reference = "sharf1993",
+     .make = make_gauss_seidel},
+    {.name = "sor",
+     .description = "block successive over-relaxation, base to tip",
+     .kind = iterative,
+     .reference = "sharf1993",
+     .make = make_sor,
+     .options = sor_options},
+    {.name = "chebyshev",
+     .description = "Chebyshev acceleration of block Jacobi (J-SI)",
+     .kind = iterative,
+     .reference = "sharf1993",
+     .parallel = true,
+     .make = make_chebyshev,
+     .options = chebyshev_options},
+    {.name = "red_black_gauss_seidel",
+     .description = "block Gauss-Seidel, every second node at once",
+     .kind = iterative,
+     .reference = "hageman1981",
+     .parallel = true,
+     .make = make_red_black_gauss_seidel},
+    {.name = "red_black_sor",
+     .description = "block successive over-relaxation, every second node at once",
+     .kind = iterative,
+     .reference = "hageman1981",
+     .parallel = true,
+     .make = make_red_black_sor,
+     .options = red_black_sor_options},
+    {.name = "rs_conjugate_gradient",
+     .description = "conjugate gradients with every second node eliminated (RS-CG)",
+     .kind = iterative,
+     .reference = "hageman1981",
+     .parallel = true,
+     .make = make_rs_conjugate_gradient},
+    {.name = "symmetric_stair_conjugate_gradient",
+     .description = "conjugate gradients, symmetric stair preconditioner",
+     .kind = iterative,
+     .reference = "bu2024",
+     .parallel = true,
+     .make = make_symmetric_stair_conjugate_gradient},
+    {.name = "block_schwarz_conjugate_gradient",
+     .description = "conjugate gradients, exact solves on pieces of block_size joints",
+     .kind = iterative,
+     .reference = "smith1996",
+     .parallel = true,
+     .make = make_block_schwarz_conjugate_gradient,
+     .options = pieces_options},
+    {.name = "two_level",
+     .description =
+         "conjugate gradients, exact solves on pieces and a coarse space of their coupling",
+     .kind = iterative,
+     .reference = "tang2009",
+     .parallel = true,
+     .make = make_two_level,
+     .options = pieces_options},
+    {.name = "lagged_thomas",
+     .description = "conjugate gradients, preconditioned by the factor of an earlier system",
+     .kind = iterative,
+     .reference = "golub2013",
+     .make = make_lagged_thomas,
+     .options = lagged_thomas_options},
 };
 
 }  // namespace
@@ -67,23 +134,16 @@ std::string_view to_string(SolverKind kind) {
 
 std::span<const SolverEntry> solver_table() { return table; }
 
-const SolverEntry& find_solver(std::string_view name) {
-  std::string known;
-  for (const SolverEntry& entry : table) {
-    if (entry.name == name) return entry;
-    known += (known.empty() ? " " : ", ") + std::string(entry.name);
-  }
-  throw InputError("unknown solver '" + std::string(name) + "'; known are" + known);
-}
+const SolverEntry& find_solver(std::string_view name) { return find_named("solver", name, table); }
 
 std::vector<SolverOption> solver_options() {
   std::vector<SolverOption> all;
   const auto add = [&](std::string_view owner, std::span<const Option> options) {
     for (const Option& option : options) {
-      const auto same = [&](const SolverOption& o) { return o.option->name == option.name; };
+      const auto same = [&](const SolverOption& o) { return o.name == option.name; };
       const auto at = std::find_if(all.begin(), all.end(), same);
       if (at == all.end())
-        all.push_back({&option, std::string(owner)});
+        all.push_back({option.name, &option, std::string(owner)});
       else
         at->owners += ", " + std::string(owner);
     }
@@ -96,12 +156,7 @@ std::vector<SolverOption> solver_options() {
 }
 
 const Option& find_option(std::string_view name) {
-  std::string known;
-  for (const SolverOption& each : solver_options()) {
-    if (each.option->name == name) return *each.option;
-    known += (known.empty() ? "" : ", ") + std::string(each.option->name);
-  }
-  throw InputError("solver_options: unknown key '" + std::string(name) + "'; known: " + known);
+  return *find_named("solver_options: key", name, solver_options()).option;
 }
 
 std::unique_ptr<LinearSolver> make_solver(std::string_view name, const SolverOptions& options) {

@@ -20,10 +20,10 @@ struct SolverEntry {
   std::string_view name;
   std::string_view description;
   SolverKind kind;
-  bool chains_only;            ///< InputError on trees that branch
-  bool takes_loops;            ///< takes the graph of a machine with closed loops
-  bool parallel;               ///< can all nodes work at once, up to sums and short recursions?
   std::string_view reference;  ///< key in references.bib
+  bool chains_only = false;    ///< InputError on trees that branch
+  bool takes_loops = false;    ///< takes the graph of a machine with closed loops
+  bool parallel = false;       ///< can all nodes work at once, up to sums and short recursions?
   std::unique_ptr<LinearSolver> (*make)(const SolverOptions&);
   OptionList* options = no_options;  ///< its own, besides common_options()
 };
@@ -33,6 +33,7 @@ std::span<const SolverEntry> solver_table();
 const SolverEntry& find_solver(std::string_view name);
 /// An option as users know it.
 struct SolverOption {
+  std::string_view name;
   const Option* option;
   std::string owners;  ///< the solvers or guesses that have it, by name; empty: all solvers
 };

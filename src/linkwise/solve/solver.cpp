@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "linkwise/base/error.hpp"
+#include "linkwise/base/named.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
@@ -43,12 +43,7 @@ std::span<const StopRuleEntry> stop_rule_table() { return stop_rules; }
 std::string_view to_string(StopRule rule) { return stop_rules[static_cast<int>(rule)].name; }
 
 StopRule stop_rule_from_name(std::string_view name) {
-  std::string known;
-  for (size_t i = 0; i < std::size(stop_rules); ++i) {
-    if (stop_rules[i].name == name) return static_cast<StopRule>(i);
-    known += (known.empty() ? " " : ", ") + std::string(stop_rules[i].name);
-  }
-  throw InputError("unknown stop rule '" + std::string(name) + "'; known are" + known);
+  return static_cast<StopRule>(&find_named("stop rule", name, stop_rules) - stop_rules);
 }
 
 std::span<const Option> common_options() { return common; }

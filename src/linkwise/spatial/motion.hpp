@@ -35,6 +35,14 @@ LW_INLINE Force<A>& operator-=(Force<A>& a, const Force<B>& b) {
   a.ang -= b.ang;
   return a;
 }
+template <class A, class B>
+LW_INLINE Motion<Wider<A, B>> operator*(const A& s, const Motion<B>& v) {
+  return {s * v.lin, s * v.ang};
+}
+template <class A, class B>
+LW_INLINE Force<Wider<A, B>> operator*(const A& s, const Force<B>& f) {
+  return {s * f.lin, s * f.ang};
+}
 /// to = f, component by component. A copy of the whole may go through memory. If the components
 /// were just computed, it would read in wide words what was written in narrow ones: a stall of a
 /// dozen cycles.

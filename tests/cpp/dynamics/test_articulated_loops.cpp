@@ -79,7 +79,7 @@ Vector6<double> joint_motion(std::span<const Element> stack, const double* q, co
     v = element_pose(e, q) * v;
     for (int k = 0; k < e.nv; ++k) {
       const auto column = element_column<double>(e, k);
-      v += Motion<double>{u[e.v + k] * column.lin, u[e.v + k] * column.ang};
+      v += u[e.v + k] * column;
     }
   }
   return to_array(v);

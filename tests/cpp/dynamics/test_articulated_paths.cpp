@@ -177,7 +177,6 @@ TEST(Paths, TheMethodOfATreeIsTheOneOnPaths) {
   add_legs(arms, 8, 10, -1);
   const Model model = model_of(arms);
   ASSERT_TRUE(paths_fill(model, native_lanes));
-  EXPECT_TRUE(is_split(model));
   const DynamicsCase c(model, 5);
   ArticulatedPaths<Lanes<native_lanes>> paths(model);
   const Motion6 want = run(paths, model, c.input());

@@ -34,6 +34,7 @@ struct Rows {
             .v = v.data(),
             .tau = tau.data(),
             .du = du.data(),
+            .prescribed = du.data(),
             .external = external.data()};
   }
 };
@@ -47,29 +48,29 @@ class Batch : public ::testing::TestWithParam<Machine> {};
 // From one system to two full groups and one more, by one evaluator that keeps its workspace.
 TEST_P(Batch, EqualsOneByOne) {
   const Model model(GetParam().spec);
-  const size_t nv = model.nv(), n_load = 6 * model.n_joints();
+  const size_t nv = model.nv(), load_width = 6 * model.n_joints();
   BatchEvaluator batch(model);
   DynamicsOptions options;
   options.method = "articulated_body";
   const auto forward = make_dynamics(model, options);
   InverseDynamics<double> inverse(model);
-  std::vector<double> one(nv), loads(n_load);
+  std::vector<double> one(nv), loads(load_width);
   for (size_t count = 1; count <= 2 * native_lanes + 1; ++count) {
     const Rows rows(model, count);
     // One more of each, to see that nothing is written beyond the end.
-    std::vector<double> du(count * nv + 1, 7), w(count * n_load + 1, 7);
-    std::vector<double> tau(count * nv + 1, 7), w_inverse(count * n_load + 1, 7);
+    std::vector<double> du(count * nv + 1, 7), w(count * load_width + 1, 7);
+    std::vector<double> tau(count * nv + 1, 7), w_inverse(count * load_width + 1, 7);
     EXPECT_EQ(batch.forward_dynamics(count, rows.input(), du.data(), w.data()), -1);
     batch.inverse_dynamics(count, rows.input(), tau.data(), w_inverse.data());
     for (size_t i = 0; i < count; ++i) {
       const DynamicsCase& c = rows.cases[i];
       ASSERT_TRUE(forward->evaluate(0, c.input(), one.data(), loads.data()).ok());
       expect_close(row(du, nv, i), one, 1e-10, "accelerations");
-      expect_close(row(w, n_load, i), loads, 1e-10, "loads");
+      expect_close(row(w, load_width, i), loads, 1e-10, "loads");
       inverse.evaluate(c.input(), c.given.data(), one.data(), loads.data());
       add_armature_bias(model, c.input().v, 1, one.data());
       expect_close(row(tau, nv, i), one, 1e-13, "torques");
-      expect_close(row(w_inverse, n_load, i), loads, 1e-13, "loads of the inverse dynamics");
+      expect_close(row(w_inverse, load_width, i), loads, 1e-13, "loads of the inverse dynamics");
     }
     for (const auto* array : {&du, &w, &tau, &w_inverse}) EXPECT_EQ(array->back(), 7);
   }
@@ -105,7 +106,7 @@ TEST_P(Batch, WhatIsAbsentIsZero) {
                          {.q = rows.q.data(),
                           .v = zero.data(),
                           .tau = rows.tau.data(),
-                          .du = zero.data(),
+                          .prescribed = zero.data(),
                           .external = no_wrench.data(),
                           .gravity_factor = 0.5},
                          zeros.data(), nullptr);
@@ -126,17 +127,17 @@ class ConstraintForceBatch : public ::testing::TestWithParam<Machine> {};
 
 TEST_P(ConstraintForceBatch, EqualsTheRecursion) {
   const Model model(GetParam().spec);
-  const size_t nv = model.nv(), n_load = 6 * model.n_joints(), count = native_lanes + 1;
+  const size_t nv = model.nv(), load_width = 6 * model.n_joints(), count = native_lanes + 1;
   BatchEvaluator batch(model);
   const Rows rows(model, count);
-  std::vector<double> du(count * nv), w(count * n_load), want_du(count * nv), want_w(w.size());
+  std::vector<double> du(count * nv), w(count * load_width), want_du(count * nv), want_w(w.size());
   EXPECT_EQ(batch.forward_dynamics(count, rows.input(), want_du.data(), want_w.data()), -1);
   EXPECT_EQ(batch.forward_dynamics(count, rows.input(), du.data(), w.data(),
                                    BatchMethod::constraint_force),
             -1);
   for (size_t i = 0; i < count; ++i) {
     expect_close(row(du, nv, i), row(want_du, nv, i), 1e-9, "accelerations");
-    expect_close(row(w, n_load, i), row(want_w, n_load, i), 1e-9, "loads");
+    expect_close(row(w, load_width, i), row(want_w, load_width, i), 1e-9, "loads");
   }
 }
 

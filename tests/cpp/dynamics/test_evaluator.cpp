@@ -145,6 +145,19 @@ TEST(Evaluator, OptionsThatChangeNothingKeepTheLanes) {
   EXPECT_EQ(times_asked(given), static_cast<int>(count));
 }
 
+TEST(Evaluator, OneStateIsTheWorkOfTheMethodInTheTable) {
+  for (const int n : {1, 5, 100}) {
+    const Model m = arm(n);
+    const DynamicsCase c(m, 1);
+    const Motion6 want = evaluate(*make_dynamics(m, evaluation_options()), m, c.input());
+    std::vector<double> du(m.nv());
+    BatchInput in{c.state.q.data(), c.state.v.data(), c.tau.data()};
+    in.external = c.external.data();
+    Evaluator(m).forward_dynamics(1, in, evaluation_options(), {du.data()}, go_on);
+    EXPECT_EQ(du, want.du) << n;
+  }
+}
+
 TEST(Evaluator, PassiveForcesActWhereAskedFor) {
   Draws draws(32);
   ModelSpec spec = tree_spec(std::vector(3, revolute), chain_parents(3), draws);
@@ -221,9 +234,9 @@ TEST(Evaluator, RefusesWhatTheModelHasNot) {
   in.external = wrench.data();
   EXPECT_THROW(forward(), InputError);
   in.external = nullptr;
-  in.du = du.data();
+  in.prescribed = du.data();
   EXPECT_THROW(forward(), InputError);
-  in.du = nullptr;
+  in.prescribed = nullptr;
   in.gravity_factor = NAN;
   EXPECT_THROW(forward(), InputError);
 }

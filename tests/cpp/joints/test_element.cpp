@@ -77,7 +77,7 @@ TEST_P(EveryKind, PoseRateAndColumnsAgree) {
     Motion<double> relative{};
     for (int k = 0; k < kind.nv; ++k) {
       const Motion<double> column = element_column<double>(e, k);
-      relative += Motion<double>{u[first_v + k] * column.lin, u[first_v + k] * column.ang};
+      relative += u[first_v + k] * column;
     }
     const Transform<double> X = pose_at(0);
     const Mat3<double> turned = tilde(relative.ang) * X.R;
@@ -176,7 +176,7 @@ void expect_shortcuts(const Kind& kind, Draws& draws) {
   add_inertia(Y, random_inertia(draws));
   Motion<double> moved = v;
   Joint::add_rate(moved, e.pitch, u);
-  const Motion<double> Pu{u * P.lin, u * P.ang};
+  const Motion<double> Pu = u * P;
   const auto want_moved = to_array(v), got_moved = to_array(moved), step = to_array(Pu);
   const auto bias = to_array(Joint::bias(v, e.pitch, u)), want_bias = to_array(cross(v, Pu));
   const auto column = to_array(Joint::column(Y, e.pitch)), want_column = to_array(Y * P);

@@ -57,9 +57,7 @@ TEST_P(BodyStates, VelocitiesAndAccelerationsAreRatesOfThePoses) {
     const BodyTopology& body = model.topology[n];
     if (body.parent >= 0) a[n] = swept.states[n].X * a[body.parent];
     a[n] += swept.states[n].c;
-    const auto accelerate = [&](const Motion<double>& P, double rate) {
-      a[n] += Motion<double>{rate * P.lin, rate * P.ang};
-    };
+    const auto accelerate = [&](const Motion<double>& P, double rate) { a[n] += rate * P; };
     if (body.joint_kind == JointKind::general) {
       const auto& g = swept.general[body.general];
       for (int i = 0; i < g.n; ++i) accelerate(g.P[i], du[g.dof[i]]);

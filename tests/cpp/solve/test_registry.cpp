@@ -30,19 +30,19 @@ TEST(Registry, NamesAreUniqueAndDescribed) {
 
 TEST(Registry, UnknownNamesListTheKnownOnes) {
   const std::string solver = error_of([] { make_solver("thomass"); });
-  EXPECT_NE(solver.find("unknown solver 'thomass'"), std::string::npos) << solver;
+  EXPECT_NE(solver.find("solver 'thomass' is unknown"), std::string::npos) << solver;
   for (const SolverEntry& entry : solver_table())
     EXPECT_NE(solver.find(entry.name), std::string::npos) << entry.name;
   const std::string guess = error_of([] { make_initial_guess("cubix"); });
-  EXPECT_NE(guess.find("unknown initial guess 'cubix'"), std::string::npos) << guess;
+  EXPECT_NE(guess.find("initial guess 'cubix' is unknown"), std::string::npos) << guess;
   for (const InitialGuessEntry& entry : initial_guess_table())
     EXPECT_NE(guess.find(entry.name), std::string::npos) << entry.name;
   EXPECT_EQ(error_of([] { stop_rule_from_name("energy"); }),
-            "unknown stop rule 'energy'; known are paper, residual, energy_norm");
+            "stop rule 'energy' is unknown; known: paper, residual, energy_norm");
   EXPECT_EQ(error_of([] { SolverOptions().set("form", "four_term"); }),
             "solver options: form is 'four_term'; known are two_term, three_term");
   const std::string option = error_of([] { SolverOptions().set("omga", 1.0); });
-  EXPECT_NE(option.find("unknown key 'omga'; known: tolerance, "), std::string::npos) << option;
+  EXPECT_NE(option.find("key 'omga' is unknown; known: tolerance, "), std::string::npos) << option;
   for (const SolverOption& known : solver_options())
     EXPECT_NE(option.find(known.option->name), std::string::npos) << option;
 }

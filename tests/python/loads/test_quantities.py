@@ -161,7 +161,7 @@ def test_power_balance(swing):
 
 
 def of_samples(run):
-    """The run as an older linkwise wrote it, without the extremes between its samples."""
+    """The run, without the extremes between its samples."""
     names = [name for name in run.dataset.data_vars if str(name).startswith("extreme_")]
     return lw.Run(run.dataset.drop_vars(names), model=run.load_model())
 

@@ -321,39 +321,23 @@ def test_forged_descriptions_end_in_one_line(copy, name, change):
     said(copy)  # no other exception than InputError gets through
 
 
-# -- a run of an older linkwise ------------------------------------------------------------------
+# -- a run without its list ----------------------------------------------------------------------
 
 
-def make_old(path):
-    """As format 1 had it: no list, no checksums in chunks."""
-    for name in files_of(path):
-        described = path / name
-        if name == "zarr.json":
-            content = json.loads(described.read_text())
-            content["attributes"]["linkwise_run"] = 1
-            described.write_text(json.dumps(content))
-        elif name.endswith("zarr.json"):
-            content = json.loads(described.read_text())
-            content["codecs"] = [c for c in content.get("codecs", []) if c["name"] != "crc32c"]
-            described.write_text(json.dumps(content))
-        elif "/c/" in name:
-            described.write_bytes(described.read_bytes()[:-4])
-    shutil.rmtree(path / "files")
-
-
-def test_an_older_run_is_read_with_a_note(whole, copy):
-    make_old(copy)
-    with pytest.warns(UserWarning, match=r"has no checksums \(an older linkwise wrote it\)"):
-        run = lw.open_run(copy)
-    truth = lw.open_run(whole)
-    for name in truth.dataset.variables:
-        np.testing.assert_array_equal(run[name], truth[name])
-    assert run.load_model().hash == truth.load_model().hash
+@pytest.mark.parametrize("version", [1, 3])
+def test_a_run_of_another_format_is_refused(copy, version):
+    described = copy / "zarr.json"
+    content = json.loads(described.read_text())
+    content["attributes"]["linkwise_run"] = version
+    described.write_text(json.dumps(content))
+    said = f"has format {version}, this linkwise reads 2; update linkwise, or simulate again"
+    with pytest.raises(lw.InputError, match=said):
+        lw.open_run(copy)
 
 
 @pytest.mark.filterwarnings(QUIET)
-def test_an_older_run_needs_its_time_as_well(copy):
-    make_old(copy)
+def test_a_run_without_a_list_needs_its_time_as_well(copy):
+    (copy / LIST).unlink()
     shutil.rmtree(copy / "time")
     with pytest.raises(lw.InputError, match="time"):
         lw.open_run(copy)
@@ -366,17 +350,14 @@ def test_a_list_that_is_gone_is_said(copy):
 
 
 @pytest.mark.filterwarnings(QUIET)
-@pytest.mark.parametrize("old", [False, True])
 @pytest.mark.parametrize("damaged", ["bit", "end", "other array", "empty"])
-def test_chunks_without_a_list_are_checked_by_what_they_hold(copy, old, damaged):
+def test_chunks_without_a_list_are_checked_by_what_they_hold(copy, damaged):
     """By Zarr's own checksum, by unpacking them, and by their size."""
-    make_old(copy) if old else (copy / LIST).unlink()
+    (copy / LIST).unlink()
     file = copy / "velocity" / "c" / "0" / "0"
     data = bytearray(file.read_bytes())
     if damaged == "bit":
         data[len(data) // 2] ^= 16
-        if old:
-            return  # nothing could tell
     elif damaged == "end":
         data = data[:-3]
     elif damaged == "other array":

@@ -234,11 +234,11 @@ def test_single_options_may_be_keywords(chain):
         ),
         (
             {"numerics": lw.Numerics(initial_guess="magic")},
-            "magic.*known are zero, previous, linear, cubic, projection",
+            "magic.*known: zero, previous, linear, cubic, projection",
         ),
         (
             {"numerics": lw.Numerics(stop="magic")},
-            "magic.*known are paper, residual, energy_norm",
+            "magic.*known: paper, residual, energy_norm",
         ),
         ({"numerics": lw.Numerics(solver_tolerance=0)}, "solver_tolerance: 0"),
         ({"numerics": lw.Numerics(max_iterations=0)}, "max_iterations: 0 given"),

@@ -157,7 +157,7 @@ def test_wrong_forces_and_solvers_are_refused():
     system = lw.ConstraintSystem(lw.scenes.srms_3l5d(), [0.1] * 5)
     with pytest.raises(lw.InputError, match="guess"):
         system.solve("conjugate_gradient", guess=[1.0])
-    with pytest.raises(lw.InputError, match="known are thomas"):
+    with pytest.raises(lw.InputError, match="known: thomas"):
         system.solve("magic")
     with pytest.raises(lw.InputError, match=r"f has shape"):
         system.recover([1.0])
