@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "linkwise/base/error.hpp"
@@ -34,33 +35,39 @@ std::vector<double> with_passive_forces(const Model& m, size_t count, const Batc
 }
 
 /// What joints that close loops add to a state's input. InputError where it leaves one open.
-class AppliedStates::Loops {
+class AppliedStates::Loops final : public LoopListener {
  public:
   Loops(const Model& model, const BatchInput& s, size_t count, size_t first)
-      : model_(model),
-        states_(model),
-        passive_(s.passive_acts),
-        several_(first + count > 1),
-        first_(first) {}
+      : model_(model), passive_(s.passive_acts), several_(first + count > 1), first_(first) {}
 
-  void add(size_t i, const double* tau, SweepInput<double>& in) {
-    states_.update(in);
-    const std::string where = several_ ? "state " + std::to_string(first_ + i) + ": " : "";
-    require_closed(model_, states_, where);
-    require_coupled(model_, states_, in.q, in.v, where);
+  void add(size_t i, const double* tau, SweepInput<double>& in, bool later) {
     in.loop_tau = tau;
+    row_ = first_ + i;
+    if (later) {
+      in.on_loops = this;
+      return;
+    }
+    if (!states_) states_.emplace(model_);
+    states_->update(in);
+    found(*states_, in);
+  }
+
+  void found(const LoopStates& loops, SweepInput<double>& in) override {
+    const std::string where = several_ ? "state " + std::to_string(row_) + ": " : "";
+    require_closed(model_, loops, where);
+    require_coupled(model_, loops, in.q, in.v, where);
     if (!passive_) return;
     tau_.assign(model_.loops.nv, 0.0);
-    if (tau) std::copy_n(tau, tau_.size(), tau_.begin());
-    add_passive_forces(model_.loops, states_.q().data(), states_.v().data(), tau_.data());
+    if (in.loop_tau) std::copy_n(in.loop_tau, tau_.size(), tau_.begin());
+    add_passive_forces(model_.loops, loops.q().data(), loops.v().data(), tau_.data());
     in.loop_tau = tau_.data();
   }
 
  private:
   const Model& model_;
-  LoopStates states_;
+  std::optional<LoopStates> states_;
   bool passive_, several_;
-  size_t first_;
+  size_t first_, row_ = 0;
   std::vector<double> tau_;
 };
 
@@ -78,7 +85,7 @@ AppliedStates::AppliedStates(const Model& model, size_t count, const BatchInput&
 
 AppliedStates::~AppliedStates() = default;
 
-SweepInput<double> AppliedStates::operator[](size_t i) {
+SweepInput<double> AppliedStates::row(size_t i, bool loops_later) {
   const BatchInput row = rows_.from(*model_, i);
   SweepInput<double> in;
   in.q = row.q;
@@ -87,7 +94,7 @@ SweepInput<double> AppliedStates::operator[](size_t i) {
   in.external = row.external;
   in.prescribed = row.prescribed;
   in.gravity_factor = row.gravity_factor;
-  if (loops_) loops_->add(i, row.loop_tau, in);
+  if (loops_) loops_->add(i, row.loop_tau, in, loops_later);
   return in;
 }
 

@@ -28,12 +28,16 @@ class AppliedStates {
 
   /// State i, for a sweep; it holds until the next one is asked for. InputError where it leaves a
   /// loop open.
-  SweepInput<double> operator[](size_t i);
+  SweepInput<double> operator[](size_t i) { return row(i, false); }
+  /// The same for a method. One that finds the loop joints' states itself is to say then whether
+  /// they are open, and gets their passive forces.
+  SweepInput<double> for_method(size_t i, bool finds_loops) { return row(i, finds_loops); }
   /// All of them; rates may still be null.
   const BatchInput& rows() const { return rows_; }
 
  private:
   class Loops;
+  SweepInput<double> row(size_t i, bool loops_later);
 
   const Model* model_;
   BatchInput rows_;

@@ -80,9 +80,9 @@ void one_by_one(const Model& m, DynamicsMethod& method, size_t count, AppliedSta
            rows_finite(out.joint_load, i, 1, load_width);
   };
   for (size_t i = 0; i < count && (count == 1 || go_on()); ++i) {
-    const DynamicsReport r =
-        method.evaluate(0, states[i], out.acceleration + i * m.nv(),
-                        out.joint_load ? out.joint_load + i * load_width : nullptr);
+    const DynamicsReport r = method.evaluate(
+        0, states.for_method(i, method.finds_loops()), out.acceleration + i * m.nv(),
+        out.joint_load ? out.joint_load + i * load_width : nullptr);
     report.loops = r.loops;
     report.iterations = std::max(report.iterations, r.iterations);
     report.error_estimate = std::max(report.error_estimate, r.error_estimate);

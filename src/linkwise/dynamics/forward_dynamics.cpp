@@ -144,6 +144,7 @@ constexpr DynamicsEntry table[] = {
      .uses_solver = true,
      .chains_only = true,
      .linear_time = true,
+     .takes_loops = true,
      .make = make_method<Piecewise>},
     {.name = "composite_rigid_body",
      .description = "joint-space mass matrix and its Cholesky factor, O(N depth) to O(N^3)",
@@ -176,6 +177,7 @@ class WithArmatureBias final : public DynamicsMethod {
     with_bias.tau = tau_.data();
     return method_->evaluate(t, with_bias, du, loads);
   }
+  bool finds_loops() const override { return method_->finds_loops(); }
   void accepted(double t) override { method_->accepted(t); }
   std::span<const double> coupling_load() const override { return method_->coupling_load(); }
   std::span<const double> constraint_force() const override { return method_->constraint_force(); }
@@ -200,10 +202,20 @@ std::string rounded(double x) {
   return text.str();
 }
 
+/// On shorter chains the pieces are too short to pay for the cut system
+/// (benchmarks/cpp/crossovers.cpp).
+constexpr int piecewise_from = 64;
+
 void choose_for_loops(const Model& model, Choice& choice) {
   if (!model.bearings.empty()) {
     choice.method = "articulated_body";
     choice.reason = "closed loops, whose bearings share loads in the recursion alone";
+    return;
+  }
+  if (model.n_bodies() >= piecewise_from && Piecewise::closes_cheaply(model)) {
+    choice.method = "piecewise";
+    choice.reason = "a revolute chain of " + std::to_string(model.n_bodies()) +
+                    " bodies: its pieces fill the SIMD lanes, and the loops close where pieces end";
     return;
   }
   const LoopWork work = count_loop_work(model);
@@ -223,10 +235,6 @@ void require_solver_of_loops(const std::string& solver) {
                      "' takes trees, and this machine has closed loops or couplings; use solver "
                      "thomas or conjugate_gradient");
 }
-
-/// On shorter chains the pieces are too short to pay for the cut system
-/// (benchmarks/cpp/crossovers.cpp).
-constexpr int piecewise_from = 64;
 
 Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
   Choice choice{options.method, options.solver, "as asked for"};

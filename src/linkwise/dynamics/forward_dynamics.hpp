@@ -37,6 +37,8 @@ class DynamicsMethod {
   /// du [nv]; loads [n_loads][6] or null. t is only used to warm-start iterations.
   virtual DynamicsReport evaluate(double t, const SweepInput<double>& in, double* du,
                                   double* loads) = 0;
+  /// Does it find the loop joints' states on its way, and tell in.on_loops?
+  virtual bool finds_loops() const { return false; }
   /// The state at t was accepted by the integrator: warm starts may build on its solution.
   virtual void accepted(double /*t*/) {}
   /// Unknowns of the last evaluation; empty for methods without constraint forces.

@@ -40,7 +40,8 @@ DynamicsReport MethodOverTime::evaluate(double t, const SweepInput<double>& in, 
 EvaluationReport MethodOverTime::evaluate(double t, const BatchInput& state, double* du,
                                           double* loads, bool accept) {
   AppliedStates applied(*model_, 1, state);
-  const DynamicsReport report = evaluate(t, applied[0], du, loads);
+  const DynamicsReport report =
+      evaluate(t, applied.for_method(0, method_->finds_loops()), du, loads);
   if (accept && report.ok()) method_->accepted(t);
   return evaluation_report(*model_, choice_, report);
 }
@@ -53,8 +54,8 @@ std::vector<MethodOverTime::Step> MethodOverTime::follow(std::span<const double>
   const Clock::time_point begin = Clock::now();
   for (size_t i = 0; i < times.size() && go_on(); ++i) {
     const Clock::time_point started = Clock::now();
-    const DynamicsReport report =
-        evaluate(times[i], applied[i], du + i * static_cast<size_t>(model_->nv()), nullptr);
+    const DynamicsReport report = evaluate(times[i], applied.for_method(i, method_->finds_loops()),
+                                           du + i * static_cast<size_t>(model_->nv()), nullptr);
     steps.push_back({report, seconds_since(started)});
     method_->accepted(times[i]);
     if (seconds_since(begin) > time_limit) break;

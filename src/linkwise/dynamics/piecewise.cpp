@@ -1,26 +1,41 @@
 #include "linkwise/dynamics/piecewise.hpp"
 
+#include <algorithm>
+
 #include "linkwise/base/error.hpp"
 #include "linkwise/constraint/joint_constraint.hpp"
+#include "linkwise/dynamics/chain_pieces.hpp"
+#include "linkwise/dynamics/piece_closure.hpp"
 #include "linkwise/exec/executor.hpp"
 #include "linkwise/recursion/piece_group.hpp"
 #include "linkwise/solve/checked_solver.hpp"
 
 namespace linkwise {
+
+class PiecewiseChain {
+ public:
+  virtual ~PiecewiseChain() = default;
+  virtual DynamicsReport evaluate(const SweepInput<double>& in, double* du, double* loads) = 0;
+  virtual std::span<const double> constraint_force() const = 0;
+  virtual bool finds_loops() const = 0;
+};
+
 namespace {
 
 using Group = Lanes<native_lanes>;
 
-}  // namespace
-
-class PiecewiseChain {
+/// rows: of forces at the outboard end of a piece: those of a cut joint, or six where joints close
+/// loops.
+template <int rows>
+class Chain final : public PiecewiseChain {
  public:
-  PiecewiseChain(const Model& model, const DynamicsOptions& options)
+  static constexpr bool closes = rows == 6;
+
+  Chain(const Model& model, const DynamicsOptions& options)
       : model_(model),
         executor_(options.executor.where_it_pays(Worth::region, model.n_bodies())),
-        n_(model.n_bodies()),
-        n_pieces_(Piecewise::pieces(n_)),
-        length_((n_ + n_pieces_ - 1) / n_pieces_),
+        pieces_(model.n_bodies(), closes ? PieceClosure::end_bodies(model) : std::vector<int>()),
+        n_pieces_(pieces_.count()),
         pose_(n_pieces_),
         bias_(n_pieces_),
         solver_(options.solver.empty() || options.solver == "auto" ? "thomas" : options.solver,
@@ -31,17 +46,28 @@ class PiecewiseChain {
     b_.resize(A_.size());
     f_.resize(A_.size());
     for (int g = 0; g < (n_pieces_ + native_lanes - 1) / native_lanes; ++g) {
-      LaneBodies<Group> bodies(model, length_, [&](int k, int l) { return body_at(g, l, k); });
+      LaneBodies<Group> bodies(model, pieces_.length(),
+                               [&](int k, int l) { return body_at(g, l, k); });
       // The first body of a piece of fillers must have an inertia to invert. It acts on nothing.
+      std::array<int, native_lanes> last{};
       for (int l = 0; l < native_lanes; ++l)
-        if (body_at(g, l, 0) >= n_) set_lanes<Group>(bodies[0].body, l, unit_body());
-      groups_.emplace_back(std::move(bodies));
+        if (body_at(g, l, 0) < 0)
+          set_lanes<Group>(bodies[0].body, l, unit_body());
+        else
+          last[l] = pieces_.size(g * native_lanes + l) - 1;
+      groups_.emplace_back(std::move(bodies), last);
     }
     cuts_.resize(groups_.size());
+    if (closes) {
+      closure_.emplace(model, pieces_);
+      closed_.resize(n_pieces_);
+    }
   }
 
-  DynamicsReport evaluate(const SweepInput<double>& in, double* du, double* loads) {
-    in_ = &in;
+  bool finds_loops() const override { return closes; }
+
+  DynamicsReport evaluate(const SweepInput<double>& given, double* du, double* loads) override {
+    const SweepInput<double>& in = in_ = given;
     executor_.for_each(n_groups(), [&](int g) {
       cuts_[g].span = groups_[g].across([&](int k) { return gather(in.q, g, k); },
                                         [&](int k) { return in.v ? gather(in.v, g, k) : Group{}; });
@@ -54,11 +80,12 @@ class PiecewiseChain {
           groups_[g].eliminate_joints([&](int k) { return gather(in.tau, g, k); }, cuts_[g].ends);
     });
     assemble();
-    DynamicsReport report{solver_.solve(A_, b_, f_)};
+    DynamicsReport report =
+        closes ? solve_closed(loads != nullptr) : DynamicsReport{solver_.solve(A_, b_, f_)};
     for (const Cuts& cuts : cuts_)
       if (!cuts.answer.positive) report.outcome = Outcome::not_positive_definite;
-    if (!report.ok()) {
-      report.body = report.node >= 0 ? first(report.node) : -1;
+    if (!report.ok() && report.outcome != Outcome::singular_position) {
+      report.body = report.node >= 0 ? pieces_.first(report.node) : -1;
       return report;
     }
     spread_forces();
@@ -66,29 +93,30 @@ class PiecewiseChain {
       Cuts& cuts = cuts_[g];
       cuts.motion = groups_[g].accelerate_bodies(cuts.answer, cuts.forces, [&](int k, Group rate) {
         for (int l = 0; l < native_lanes; ++l)
-          if (const int n = body_at(g, l, k); n < n_) du[n] = rate[l];
+          if (const int n = body_at(g, l, k); n >= 0) du[n] = rate[l];
       });
       if (loads) store_loads(g, loads);
     });
     cut_rates(du);
+    if (closes && loads) closure_->store_loads(loads + 6 * model_.n_joints());
     return report;
   }
 
-  std::span<const double> constraint_force() const { return f_; }
+  std::span<const double> constraint_force() const override { return f_; }
 
  private:
   /// What the pieces of a group and the cut system say to each other.
   struct Cuts {
     PieceSpan<Group> span;
-    PieceEnds<Group> ends;
-    PieceAnswer<Group> answer;
-    PieceForces<Group> forces;
+    PieceEnds<Group, rows> ends;
+    PieceAnswer<Group, rows> answer;
+    PieceForces<Group, rows> forces;
     PieceMotion<Group> motion;
   };
 
   int n_groups() const { return static_cast<int>(groups_.size()); }
-  int first(int piece) const { return piece * length_; }
-  int body_at(int g, int l, int k) const { return (g * native_lanes + l) * length_ + k; }
+  /// Or -1.
+  int body_at(int g, int l, int k) const { return pieces_.body_at(g * native_lanes + l, k); }
   Cuts& cuts(int piece) { return cuts_[piece / native_lanes]; }
 
   /// values[body] at position k of each piece; bodies and coordinates of a chain are numbered
@@ -96,17 +124,16 @@ class PiecewiseChain {
   Group gather(const double* values, int g, int k) const {
     Group out{};
     for (int l = 0; l < native_lanes; ++l)
-      if (const int n = body_at(g, l, k); n < n_) out[l] = values[n];
+      if (const int n = body_at(g, l, k); n >= 0) out[l] = values[n];
     return out;
   }
 
   void add_external(int g) {
-    if (!in_->external) return;
+    if (!in_.external) return;
     for (int l = 0; l < native_lanes; ++l)
-      for (int k = 0; k < length_; ++k) {
+      for (int k = 0; k < pieces_.size(g * native_lanes + l); ++k) {
         const int n = body_at(g, l, k);
-        if (n >= n_) return;
-        const Force<double> w = user_wrench(in_->external, model_.joints[n], n);
+        const Force<double> w = user_wrench(in_.external, model_.joints[n], n);
         groups_[g].add_wrench(k, l, {-w.lin, -w.ang});
       }
   }
@@ -115,21 +142,20 @@ class PiecewiseChain {
   void scan_velocities() {
     Motion<double> v_last{};
     for (int s = 0; s < n_pieces_; ++s) {
-      const int n = first(s), l = s % native_lanes;
-      PieceEnds<Group>& e = cuts(s).ends;
-      if (n >= n_) {
+      const int n = pieces_.first(s), l = s % native_lanes;
+      PieceEnds<Group, rows>& e = cuts(s).ends;
+      clear_outboard(s);
+      if (pieces_.size(s) == 0) {
         set_lanes<Group>(e.v_first, l, Motion<double>{});
-        for (auto& column : e.cut_columns) set_lanes<Group>(column, l, Motion<double>{});
-        set_lanes<Group>(e.known_outboard, l, Force<double>{});
         e.first_torque[l] = 0;
         pose_[s] = {Mat3<double>::identity(), {}};
         bias_[s] = {};
-        if (s > 0) clear_outboard(s - 1);
+        if (closes) closed_[s].ends_chain = true;
         continue;
       }
-      const double u = in_->v ? in_->v[n] : 0, tau = in_->tau[n];
+      const double u = in_.v ? in_.v[n] : 0, tau = in_.tau[n];
       const BodyConstants<double>& c = model_.constants[n];
-      pose_[s] = RevoluteJoint::pose(c.tree, 0.0, in_->q[n]);
+      pose_[s] = RevoluteJoint::pose(c.tree, 0.0, in_.q[n]);
       Motion<double> v = pose_[s] * v_last;
       v.ang.z += u;
       bias_[s] = RevoluteJoint::bias(v, 0.0, u);
@@ -137,16 +163,18 @@ class PiecewiseChain {
       e.first_torque[l] = tau;
       if (s > 0) set_outboard(s - 1, pose_[s], tau);
       const PieceSpan<Group>& span = cuts(s).span;
-      v_last = get_lanes<Transform<double>, Group>(span.across, l) * v;
+      const auto across = get_lanes<Transform<double>, Group>(span.across, l);
+      v_last = across * v;
       v_last += get_lanes<Motion<double>, Group>(span.relative, l);
+      if (closes) close_end(s, across, v_last);
     }
-    clear_outboard(n_pieces_ - 1);
+    if (closes) update_closure();
   }
 
   /// The inboard body feels -X^T (Q f + z tau) of the next piece's joint.
   void set_outboard(int s, const Transform<double>& X, double tau) {
-    PieceEnds<Group>& e = cuts(s).ends;
-    for (int j = 0; j < cut_rows; ++j) {
+    PieceEnds<Group, rows>& e = cuts(s).ends;
+    for (int j = 0; j < rows; ++j) {
       double unit[6] = {};
       unit[j] = 1;
       const Force<double> w = transpose_times(X, to_force(unit));
@@ -154,50 +182,95 @@ class PiecewiseChain {
     }
     const Force<double> w = transpose_times(X, Force<double>{{}, {0, 0, tau}});
     set_lanes<Group>(e.known_outboard, s % native_lanes, Force<double>{-w.lin, -w.ang});
+    if (closes && s >= 0) closed_[s].outboard = X;
   }
   void clear_outboard(int s) {
-    PieceEnds<Group>& e = cuts(s).ends;
+    PieceEnds<Group, rows>& e = cuts(s).ends;
     for (auto& column : e.cut_columns) set_lanes<Group>(column, s % native_lanes, Motion<double>{});
     set_lanes<Group>(e.known_outboard, s % native_lanes, Force<double>{});
   }
 
+  bool ends_chain(int s) const { return s + 1 == n_pieces_ || pieces_.size(s + 1) == 0; }
+
+  /// What loop joints see of the last body. Beyond the end of the chain they push in its own frame.
+  void close_end(int s, const Transform<double>& across, const Motion<double>& v_last) {
+    closed_[s].across = across * pose_[s];
+    closed_[s].v_last = v_last;
+    closed_[s].ends_chain = ends_chain(s);
+    if (ends_chain(s)) set_outboard(s, {Mat3<double>::identity(), {}}, 0);
+  }
+
+  void update_closure() {
+    closure_->update(in_, closed_);
+    closure_->known_wrenches([&](int s, const Force<double>& w) {
+      add_lanes<Group>(cuts(s).ends.known_outboard, s % native_lanes, w);
+    });
+  }
+
   void assemble() {
-    const Motion<double> ground = ground_acceleration<double>(model_, in_->gravity_factor);
+    const Motion<double> ground = ground_acceleration<double>(model_, in_.gravity_factor);
     for (int s = 0; s < n_pieces_; ++s) {
-      const PieceAnswer<Group>& own = cuts(s).answer;
+      const PieceResponse<Group, rows>& own = cuts(s).answer.response;
       const int l = s % native_lanes;
       const Motion<double> free = get_lanes<Motion<double>, Group>(own.a_free, l);
       const Motion<double> from_ground = pose_[s] * ground;
-      const PieceAnswer<Group>* in = s > 0 ? &cuts(s - 1).answer : nullptr;
+      // Pieces of fillers hang on nothing.
+      const bool hangs = s > 0 && pieces_.size(s) > 0;
+      const PieceResponse<Group, rows>* in = hangs ? &cuts(s - 1).answer.response : nullptr;
       const int li = (s + native_lanes - 1) % native_lanes;
       for (int i = 0; i < cut_rows; ++i) {
         for (int j = 0; j < cut_rows; ++j)
           A_.diag[s][block_stride * i + j] =
               own.QJQ[packed(i, j)][l] + (in ? in->PsiJPsi[packed(i, j)][li] : 0);
         b_[cut_rows * s + i] = to_array(bias_[s])[i] - to_array(free)[i] +
-                               (in ? in->beta[i][li] : to_array(from_ground)[i]);
+                               (in       ? in->beta[i][li]
+                                : s == 0 ? to_array(from_ground)[i]
+                                         : 0);
         if (in)
           for (int j = 0; j < cut_rows; ++j)
-            A_.parent_block[s][block_stride * i + j] = -in->PsiJQ[5 * i + j][li];
+            A_.parent_block[s][block_stride * i + j] = -in->PsiJQ[cut_rows * i + j][li];
       }
     }
   }
 
+  /// The cut forces with those of the loops.
+  DynamicsReport solve_closed(bool with_loads) {
+    DynamicsReport report;
+    if constexpr (closes) {
+      report.outcome = factor_.factor(A_);
+      report.node = factor_.failed_node();
+      if (!report.ok()) return report;
+      for (int s = 0; s < n_pieces_; ++s)
+        closed_[s].response = get_lanes<PieceResponse<double, rows>, Group>(cuts(s).answer.response,
+                                                                            s % native_lanes);
+      f_ = b_;
+      factor_.solve_in_place(f_);
+      closure_->solve(closed_, ground_acceleration<double>(model_, in_.gravity_factor), factor_, f_,
+                      with_loads);
+      report.loops = closure_->report();
+      if (report.loops.is_contradictory()) report.outcome = Outcome::singular_position;
+    }
+    return report;
+  }
+
   void spread_forces() {
-    for (int s = 0; s < n_pieces_; ++s)
-      for (int j = 0; j < cut_rows; ++j) {
-        PieceForces<Group>& forces = cuts(s).forces;
-        forces.first[j][s % native_lanes] = f_[cut_rows * s + j];
-        forces.outboard[j][s % native_lanes] = s + 1 < n_pieces_ ? f_[cut_rows * (s + 1) + j] : 0;
-      }
+    for (int s = 0; s < n_pieces_; ++s) {
+      PieceForces<Group, rows>& forces = cuts(s).forces;
+      const int l = s % native_lanes;
+      const double* pushed = closes ? closure_->pushed(s) : nullptr;
+      for (int j = 0; j < cut_rows; ++j) forces.first[j][l] = f_[cut_rows * s + j];
+      for (int j = 0; j < rows; ++j)
+        forces.outboard[j][l] = (j < cut_rows && !ends_chain(s) ? f_[cut_rows * (s + 1) + j] : 0) +
+                                (pushed ? pushed[j] : 0);
+    }
   }
 
   void cut_rates(double* du) {
-    Motion<double> a = ground_acceleration<double>(model_, in_->gravity_factor);
-    for (int s = 0; s < n_pieces_ && first(s) < n_; ++s) {
+    Motion<double> a = ground_acceleration<double>(model_, in_.gravity_factor);
+    for (int s = 0; s < n_pieces_ && pieces_.size(s) > 0; ++s) {
       const int l = s % native_lanes;
-      du[first(s)] = get_lanes<Motion<double>, Group>(cuts(s).motion.first, l).ang.z -
-                     (pose_[s] * a).ang.z - bias_[s].ang.z;
+      du[pieces_.first(s)] = get_lanes<Motion<double>, Group>(cuts(s).motion.first, l).ang.z -
+                             (pose_[s] * a).ang.z - bias_[s].ang.z;
       a = get_lanes<Motion<double>, Group>(cuts(s).motion.last, l);
     }
   }
@@ -205,33 +278,51 @@ class PiecewiseChain {
   void store_loads(int g, double* loads) {
     groups_[g].calc_loads(cuts_[g].ends, cuts_[g].forces);
     for (int l = 0; l < native_lanes; ++l)
-      for (int k = 0; k < length_; ++k) {
+      for (int k = 0; k < pieces_.size(g * native_lanes + l); ++k) {
         const int n = body_at(g, l, k);  // and the number of its joint
-        if (n >= n_) return;
-        store_joint_load(model_, n, in_->q, groups_[g].joint_load(k, l), loads + 6 * n);
+        store_joint_load(model_, n, in_.q, groups_[g].joint_load(k, l), loads + 6 * n);
       }
   }
 
   const Model& model_;
   Executor executor_;
-  int n_, n_pieces_, length_;
-  std::vector<PieceGroup<Group>> groups_;
+  ChainPieces pieces_;
+  int n_pieces_;
+  std::vector<PieceGroup<Group, rows>> groups_;
   std::vector<Cuts> cuts_;               ///< by group
   std::vector<Transform<double>> pose_;  ///< across the cut joints
   std::vector<Motion<double>> bias_;     ///< c of the cut joints
   BlockTree A_;
   std::vector<double> b_, f_;
   CheckedSolver solver_;
-  const SweepInput<double>* in_ = nullptr;
+  TreeFactor factor_;  ///< of A, where loops close
+  std::optional<PieceClosure> closure_;
+  std::vector<ClosedPiece> closed_;
+  SweepInput<double> in_;
 };
+
+/// Only the direct solver answers each loop joint's forces as well.
+void require_thomas(const DynamicsOptions& options) {
+  if (options.solver.empty() || options.solver == "auto" || options.solver == "thomas") return;
+  throw InputError("method piecewise closes loops with solver thomas; leave solver " +
+                   options.solver + " out, or use method constraint_force");
+}
+
+}  // namespace
 
 Piecewise::Piecewise(const Model& model, const DynamicsOptions& options) {
   require_regular_inertias(model, "piecewise");
   if (!suits(model))
     throw InputError("method piecewise takes a chain of at least " + std::to_string(min_bodies) +
-                     " revolute joints without armature, and model '" + model.spec().name + "'" +
-                     model.where() + " is not one; use articulated_body");
-  chain_ = std::make_unique<PiecewiseChain>(model, options);
+                     " revolute joints without armature, with few loops, and model '" +
+                     model.spec().name + "'" + model.where() +
+                     " is not one; use method articulated_body");
+  if (model.n_loops() == 0) {
+    chain_ = std::make_unique<Chain<cut_rows>>(model, options);
+    return;
+  }
+  require_thomas(options);
+  chain_ = std::make_unique<Chain<6>>(model, options);
 }
 
 Piecewise::~Piecewise() = default;
@@ -240,6 +331,8 @@ DynamicsReport Piecewise::evaluate(double, const SweepInput<double>& in, double*
                                    double* loads) {
   return chain_->evaluate(in, du, loads);
 }
+
+bool Piecewise::finds_loops() const { return chain_->finds_loops(); }
 
 std::span<const double> Piecewise::constraint_force() const { return chain_->constraint_force(); }
 
@@ -251,15 +344,21 @@ bool Piecewise::suits(const Model& model) {
     if (!kind || body.body_kind != BodyKind::rigid || body.parent != n - 1 || body.q != n)
       return false;
   }
-  return model.singular_body() < 0;
+  if (model.singular_body() >= 0 || model.n_couplings() > 0 || !model.bearings.empty())
+    return false;
+  int rows = 0;
+  for (const LoopJoint& loop : model.loops.joints) rows += loop_rows(model, loop);
+  return rows <= PieceClosure::most_rows;
 }
 
-int Piecewise::pieces(int n_bodies) {
-  // Eight pieces fill the widest lanes. There are more only if they are long enough to hide the cut
-  // system.
-  int pieces = 8;
-  while (pieces < 1024 && n_bodies / pieces > 128) pieces *= 2;
-  return pieces;
+bool Piecewise::closes_cheaply(const Model& model) {
+  if (!suits(model)) return false;
+  int rows = 0;
+  for (const LoopJoint& loop : model.loops.joints) rows += loop_rows(model, loop);
+  const int ends = static_cast<int>(PieceClosure::end_bodies(model).size());
+  return model.n_bodies() >= 4 * rows && model.n_bodies() >= 16 * ends;
 }
+
+int Piecewise::pieces(int n_bodies) { return ChainPieces::wanted(n_bodies); }
 
 }  // namespace linkwise

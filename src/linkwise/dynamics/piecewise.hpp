@@ -11,6 +11,7 @@
 //     (X^T Q)_{s+1}^T a_last = Psi^T a_first - Lambda f_{s+1} + beta,
 //     A_ss = Q^T J Q + (Psi^T J Psi + Lambda)_{s-1},    A_{s,s-1} = -(Psi^T J Q)_{s-1},
 //     du_k = D_k^-1 (u_k - r_k f_{s+1} - U_k^T (X a + c)),   r_k = joint row of Psi.
+// Joints that close loops push on last bodies of pieces, see piece_closure.hpp.
 // The number of pieces depends on the chain alone, and the arithmetic of a lane depends on its own
 // piece alone. So any number of threads gives the same bits.
 #include <memory>
@@ -30,11 +31,15 @@ class Piecewise : public DynamicsMethod {
   ~Piecewise() override;
   DynamicsReport evaluate(double t, const SweepInput<double>& in, double* du,
                           double* loads) override;
+  bool finds_loops() const override;
+  /// Of the cut joints.
   std::span<const double> constraint_force() const override;
 
   /// A chain of revolute joints without rotors, none prescribed, of at least min_bodies, all of
-  /// regular inertia.
+  /// regular inertia; without couplings or bearings, and with few loops.
   static bool suits(const Model& model);
+  /// Of what it takes: are there bodies enough for what its loops cost beside them?
+  static bool closes_cheaply(const Model& model);
   static constexpr int min_bodies = 16;
   static int pieces(int n_bodies);
 

@@ -83,8 +83,6 @@ LoopPath loop_path(const Model& model, const LoopJoint& loop) {
 LoopStates::LoopStates(const Model& model)
     : model_(model),
       carriers_(carriers_of_loops(model)),
-      bodies_(model.n_bodies()),
-      general_(model.n_general),
       loops_(model.n_loops()),
       start_(model.loops.nq),
       q_(model.loops.nq),
@@ -103,10 +101,27 @@ LoopStates::LoopStates(const Model& model)
 }
 
 void LoopStates::update(const SweepInput<double>& in) {
+  bodies_.resize(model_.n_bodies());
+  general_.resize(model_.n_general);
   calc_body_states(model_, carriers_, in, bodies_.data(), general_.data());
+  begin(in);
+  for (int l = 0; l < model_.n_loops(); ++l) {
+    const LoopJoint& loop = model_.loops.joints[l];
+    const Transform<double> here{Mat3<double>::identity(), {}};
+    update_loop(in.v != nullptr, l,
+                {along(paths_[l].to_a, here, bodies_), along(paths_[l].to_b, here, bodies_),
+                 velocity_of(loop.parent_body), velocity_of(loop.joint.body)});
+  }
+}
+
+void LoopStates::update(const SweepInput<double>& in, const LoopEnds* ends) {
+  begin(in);
+  for (int l = 0; l < model_.n_loops(); ++l) update_loop(in.v != nullptr, l, ends[l]);
+}
+
+void LoopStates::begin(const SweepInput<double>& in) {
   std::copy_n(in.loop_q ? in.loop_q : start_.data(), q_.size(), q_.begin());
   if (any_given_) place_given(in);
-  for (int l = 0; l < model_.n_loops(); ++l) update_loop(in.v != nullptr, l);
 }
 
 void LoopStates::place_given(const SweepInput<double>& in) {
@@ -119,25 +134,25 @@ void LoopStates::place_given(const SweepInput<double>& in) {
   }
 }
 
-void LoopStates::update_loop(bool moving, int l) {
+void LoopStates::update_loop(bool moving, int l, const LoopEnds& ends) {
   const LoopJoint& loop = model_.loops.joints[l];
   LoopState& out = loops_[l];
-  const Transform<double> X_E = along(paths_[l].to_a, loop.on_parent, bodies_);
-  const Transform<double> X_F = along(paths_[l].to_b, loop.on_child, bodies_);
+  const Transform<double> X_E = loop.on_parent * ends.X_a, X_F = loop.on_child * ends.X_b;
   const Transform<double> X_FE{X_F.R * transpose(X_E.R), X_E.R * (X_F.r - X_E.r)};
   out.X_FA = X_FE * loop.on_parent;
-  const Motion<double> of_a = out.X_FA * velocity_of(loop.parent_body),
-                       of_b = loop.on_child * velocity_of(loop.joint.body);
+  const Motion<double> of_a = out.X_FA * ends.v_a, of_b = loop.on_child * ends.v_b,
+                       of_E = loop.on_parent * ends.v_a;
   out.speed = std::max(size(of_a.lin) + out.length * size(of_a.ang),
                        size(of_b.lin) + out.length * size(of_b.ang));
   if (loop.kind != LoopKind::joint)
-    update_distance(l, X_FE, of_b);
+    update_distance(l, X_FE, of_E, of_b);
   else
-    update_joint(moving, l, X_FE, of_a, of_b);
+    update_joint(moving, l, X_FE, of_a, of_b, of_E);
 }
 
 void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
-                              const Motion<double>& of_a, const Motion<double>& of_b) {
+                              const Motion<double>& of_a, const Motion<double>& of_b,
+                              const Motion<double>& of_E) {
   const LoopJoint& loop = model_.loops.joints[l];
   LoopState& out = loops_[l];
   const std::span<const Element> stack = stack_of(model_, loop);
@@ -163,7 +178,7 @@ void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
     v_[columns.dof[i]] = linkwise::along(out.basis.dual[i], relative);
   at.v = moving ? v_.data() : nullptr;
   at.prescribed = given_du_.data();
-  calc_general_state(stack, at, loop.on_parent * velocity_of(loop.parent_body), state, columns);
+  calc_general_state(stack, at, of_E, state, columns);
   const Vector6<double> c = to_array(state.c);
   out.rows = out.held = out.basis.rows();
   for (int i = 0; i < out.held; ++i) {
@@ -188,13 +203,13 @@ void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
 /// distance. That of a point is the componentwise one and w x v. A spring holds nothing. Its force
 /// is along n, which is any direction where the points meet: there a spring of length 0 has no
 /// force.
-void LoopStates::update_distance(int l, const Transform<double>& X_FE, const Motion<double>& of_b) {
+void LoopStates::update_distance(int l, const Transform<double>& X_FE, const Motion<double>& of_E,
+                                 const Motion<double>& of_b) {
   const LoopJoint& loop = model_.loops.joints[l];
   LoopState& out = loops_[l];
   const double distance = size(X_FE.r);
   const Vec3<double> n =
       distance > 0 ? (1 / distance) * (X_FE.R * X_FE.r) : Vec3<double>{1.0, 0.0, 0.0};
-  const Motion<double> of_E = loop.on_parent * velocity_of(loop.parent_body);
   const Vec3<double> relative = of_b.lin - X_FE.R * of_E.lin;
   const Vec3<double> across = relative - dot(n, relative) * n;
   const Vec3<double> turned = cross(of_b.ang, of_b.lin) - X_FE.R * cross(of_E.ang, of_E.lin);

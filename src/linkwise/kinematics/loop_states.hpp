@@ -53,11 +53,20 @@ struct LoopState {
   double length;           ///< m: how far the loop reaches, by which turns are compared
 };
 
+/// What a sweep knows of the bodies that a loop joint joins: their frames against that of the body
+/// where the loop meets, and their velocities.
+struct LoopEnds {
+  Transform<double> X_a, X_b;
+  Motion<double> v_a, v_b;
+};
+
 class LoopStates {
  public:
   explicit LoopStates(const Model& model);
 
   void update(const SweepInput<double>& in);
+  /// The same where the ends of all loops are known, [n_loops].
+  void update(const SweepInput<double>& in, const LoopEnds* ends);
 
   const LoopState& operator[](int l) const { return loops_[l]; }
   const LoopPath& path(int l) const { return paths_[l]; }
@@ -66,11 +75,13 @@ class LoopStates {
   const std::vector<double>& v() const { return v_; }
 
  private:
-  void update_loop(bool moving, int l);
+  void begin(const SweepInput<double>& in);
+  void update_loop(bool moving, int l, const LoopEnds& ends);
   /// The same of a joint, and of a rod or a spring. of_a, of_b: velocities of both bodies at F.
   void update_joint(bool moving, int l, const Transform<double>& X_FE, const Motion<double>& of_a,
-                    const Motion<double>& of_b);
-  void update_distance(int l, const Transform<double>& X_FE, const Motion<double>& of_b);
+                    const Motion<double>& of_b, const Motion<double>& of_E);
+  void update_distance(int l, const Transform<double>& X_FE, const Motion<double>& of_E,
+                       const Motion<double>& of_b);
   void place_given(const SweepInput<double>& in);
   Motion<double> velocity_of(int body) const {
     return body >= 0 ? bodies_[body].v : Motion<double>{};

@@ -3,6 +3,9 @@
 
 namespace linkwise {
 
+class LoopStates;
+class LoopListener;
+
 /// Inputs of a sweep, lanes interleaved: q[nq], v[nv], tau[nv] of scalars S.
 template <class S>
 struct SweepInput {
@@ -21,8 +24,20 @@ struct SweepInput {
   /// Rates and accelerations of prescribed loop joints, [nv] of loop joints; null: zero.
   const S* loop_v = nullptr;
   const S* loop_du = nullptr;
+  /// Who wants to know the loop joints' states; a method that does not find them itself leaves this
+  /// alone (DynamicsMethod::finds_loops).
+  LoopListener* on_loops = nullptr;
   /// Times the model's gravity; 0 leaves it out.
   double gravity_factor = 1;
+};
+
+/// Told of loop joints before anything acts on them: it may give them torques, or throw.
+class LoopListener {
+ public:
+  virtual void found(const LoopStates& loops, SweepInput<double>& in) = 0;
+
+ protected:
+  ~LoopListener() = default;
 };
 
 }  // namespace linkwise

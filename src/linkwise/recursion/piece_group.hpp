@@ -1,6 +1,7 @@
 #pragma once
 // The sweeps inside a group of pieces of a chain, one piece per lane, by the steps of steps.hpp.
 // See dynamics/piecewise.hpp for the equations.
+#include <array>
 #include <utility>
 #include <vector>
 
@@ -20,26 +21,31 @@ struct PieceSpan {
 };
 
 /// What the cut joints hand in.
-template <class S>
+template <class S, int rows>
 struct PieceEnds {
   Motion<S> v_first;
-  Motion<S> cut_columns[cut_rows];  ///< X^T Q of the outboard cut joint, as rows acting on motions
-  Force<S> known_outboard;          ///< wrench of the outboard cut joint's drive on the last body
-  S first_torque;                   ///< tau of the inboard cut joint
+  Motion<S> cut_columns[rows];  ///< X^T Q of the outboard cut joint, as rows acting on motions
+  Force<S> known_outboard;      ///< wrench on the last body of what is known outboard of it
+  S first_torque;               ///< tau of the inboard cut joint
 };
 
 /// What a piece answers at its cuts; see dynamics/piecewise.hpp.
-template <class S>
+template <class S, int rows>
+struct PieceResponse {
+  Motion<S> JPsi[rows], JQ[cut_rows], a_free;
+  S QJQ[15], PsiJPsi[rows * (rows + 1) / 2], PsiJQ[rows * cut_rows], beta[rows];
+  CutForces<S, rows> cut;  ///< at the first body
+};
+template <class S, int rows>
 struct PieceAnswer {
-  Motion<S> JPsi[cut_rows], JQ[cut_rows], a_free;
-  S QJQ[15], PsiJPsi[15], PsiJQ[25], beta[cut_rows];
+  PieceResponse<S, rows> response;
   bool positive;  ///< all D are, and Y of the first body
 };
 
 /// Forces f at both cuts, which the cut system finds.
-template <class S>
+template <class S, int rows>
 struct PieceForces {
-  S first[cut_rows], outboard[cut_rows];
+  S first[cut_rows], outboard[rows];
 };
 
 /// Accelerations of the first and the last body.
@@ -48,11 +54,19 @@ struct PieceMotion {
   Motion<S> first, last;
 };
 
-template <class S>
+/// rows: of forces at the outboard cut, see CutForces.
+template <class S, int rows>
 class PieceGroup {
  public:
-  explicit PieceGroup(LaneBodies<S> bodies)
-      : bodies_(std::move(bodies)), state_(bodies_.length()) {}
+  using Ends = PieceEnds<S, rows>;
+  using Answer = PieceAnswer<S, rows>;
+  using Forces = PieceForces<S, rows>;
+
+  /// last: position of the last body of each lane's piece; fillers follow it.
+  PieceGroup(LaneBodies<S> bodies, const std::array<int, lane_count<S>>& last)
+      : bodies_(std::move(bodies)), last_(last), state_(bodies_.length()) {
+    for (const int k : last_) state_[k].is_last = true;
+  }
 
   void add_wrench(int k, int l, const Force<double>& p) { add_lanes<S>(state_[k].bias, l, p); }
   Force<double> joint_load(int k, int l) const {
@@ -88,16 +102,20 @@ class PieceGroup {
 
   /// The recursion from the last body to the first, and what the cut system needs of it.
   template <class Tau>
-  PieceAnswer<S> eliminate_joints(Tau&& tau, const PieceEnds<S>& ends) {
+  Answer eliminate_joints(Tau&& tau, const Ends& ends) {
     ArticulatedInertia<S> Y{};
     Force<S> p{};
-    p -= ends.known_outboard;
-    CutForces<S> cut{};
-    for (int j = 0; j < cut_rows; ++j)
-      cut.Psi[j] = {ends.cut_columns[j].lin, ends.cut_columns[j].ang};
+    CutForces<S, rows> cut{};
     bool positive = true;
     for (int k = length() - 1; k >= 0; --k) {
       State& s = state_[k];
+      if (s.is_last) {
+        p -= at_last(k, ends.known_outboard);
+        for (int j = 0; j < rows; ++j) {
+          const Motion<S> column = at_last(k, ends.cut_columns[j]);
+          cut.Psi[j] += Force<S>{column.lin, column.ang};
+        }
+      }
       add_inertia(Y, bodies_[k].body);
       p += s.bias;
       if (k == 0) break;
@@ -117,21 +135,19 @@ class PieceGroup {
   }
 
   template <class Out>
-  PieceMotion<S> accelerate_bodies(const PieceAnswer<S>& answer, const PieceForces<S>& f,
-                                   Out&& du) {
+  PieceMotion<S> accelerate_bodies(const Answer& answer, const Forces& f, Out&& du) {
+    const PieceResponse<S, rows>& of = answer.response;
     PieceMotion<S> motion;
-    Motion<S> a = answer.a_free;
-    for (int j = 0; j < cut_rows; ++j) {
-      a += f.first[j] * answer.JQ[j];
-      a += Motion<S>{-f.outboard[j] * answer.JPsi[j].lin, -f.outboard[j] * answer.JPsi[j].ang};
-    }
+    Motion<S> a = of.a_free;
+    for (int j = 0; j < cut_rows; ++j) a += f.first[j] * of.JQ[j];
+    for (int j = 0; j < rows; ++j) a += -f.outboard[j] * of.JPsi[j];
     motion.first = a;
     for (int k = 0; k < length(); ++k) {
       State& s = state_[k];
       if (k > 0) {
         a = bodies_.place(k, s.turn).to_child(a);
         const Motion<S> c = RevoluteJoint::bias(s.velocity, 0.0, s.rate);
-        du(k, accelerate<RevoluteJoint>(s.axis, c, 0.0, a, CutTorque<S>{s.row, f.outboard}));
+        du(k, accelerate<RevoluteJoint>(s.axis, c, 0.0, a, CutTorque<S, rows>{s.row, f.outboard}));
       }
       s.acceleration = a;
     }
@@ -140,14 +156,17 @@ class PieceGroup {
   }
 
   /// Of all joints but the cut ones.
-  void calc_loads(const PieceEnds<S>& ends, const PieceForces<S>& f) {
+  void calc_loads(const Ends& ends, const Forces& f) {
+    Force<S> outboard{};
+    outboard -= ends.known_outboard;
+    for (int j = 0; j < rows; ++j) {
+      const Motion<S>& column = ends.cut_columns[j];
+      outboard += f.outboard[j] * Force<S>{column.lin, column.ang};
+    }
     Force<S> w{};
-    w -= ends.known_outboard;
-    for (int j = 0; j < cut_rows; ++j)
-      w += Force<S>{f.outboard[j] * ends.cut_columns[j].lin,
-                    f.outboard[j] * ends.cut_columns[j].ang};
     for (int k = length() - 1; k >= 0; --k) {
       State& s = state_[k];
+      if (s.is_last) w += at_last(k, outboard);
       inward_load(bodies_[k].body, s.acceleration, s.bias, w);
       s.joint_load = w;
       if (k > 0) w = bodies_.place(k, s.turn).to_parent(w);
@@ -161,17 +180,29 @@ class PieceGroup {
     Motion<S> velocity, acceleration;
     Force<S> bias, joint_load;
     EliminatedAxis<S> axis;
-    S row[cut_rows];  ///< of the joint in CutForces
+    S row[rows];           ///< of the joint in CutForces
+    bool is_last = false;  ///< of some lane's piece
   };
 
   int length() const { return bodies_.length(); }
 
+  /// x in the lanes whose piece ends at position k, else zero.
+  template <class X>
+  X at_last(int k, const X& x) const {
+    X out{};
+    for (int l = 0; l < lane_count<S>; ++l)
+      if (last_[l] == k) add_lanes<S>(out, l, x, l);
+    return out;
+  }
+
   /// What the first body, whose outboard side takes Y a + p, answers to forces at either cut.
-  static PieceAnswer<S> answer(const ArticulatedInertia<S>& Y, const Force<S>& p,
-                               const CutForces<S>& cut, const S& first_torque, bool positive) {
-    PieceAnswer<S> out;
+  static Answer answer(const ArticulatedInertia<S>& Y, const Force<S>& p,
+                       const CutForces<S, rows>& cut, const S& first_torque, bool positive) {
+    Answer whole;
+    PieceResponse<S, rows>& out = whole.response;
     S L[21];
-    out.positive = factor(Y, L) && positive;
+    whole.positive = factor(Y, L) && positive;
+    out.cut = cut;
     Force<S> free{-p.lin, -p.ang};
     free.ang.z += first_torque;
     out.a_free = solve(L, free);
@@ -179,21 +210,20 @@ class PieceGroup {
       S unit[6] = {};
       unit[j] = broadcast<S>(1);
       out.JQ[j] = solve(L, to_force(unit));
+      for (int i = 0; i <= j; ++i) out.QJQ[packed(j, i)] = to_array(out.JQ[j])[i];
+      for (int i = 0; i < rows; ++i) out.PsiJQ[cut_rows * i + j] = dot(out.JQ[j], cut.Psi[i]);
+    }
+    for (int j = 0; j < rows; ++j) {
       out.JPsi[j] = solve(L, cut.Psi[j]);
       out.beta[j] = cut.beta[j] + dot(out.a_free, cut.Psi[j]);
+      for (int i = 0; i <= j; ++i)
+        out.PsiJPsi[packed(j, i)] = cut.Lambda[packed(j, i)] + dot(out.JPsi[j], cut.Psi[i]);
     }
-    for (int i = 0; i < cut_rows; ++i)
-      for (int j = 0; j < cut_rows; ++j) {
-        if (j <= i) {
-          out.QJQ[packed(i, j)] = to_array(out.JQ[j])[i];
-          out.PsiJPsi[packed(i, j)] = cut.Lambda[packed(i, j)] + dot(out.JPsi[j], cut.Psi[i]);
-        }
-        out.PsiJQ[5 * i + j] = dot(out.JQ[j], cut.Psi[i]);
-      }
-    return out;
+    return whole;
   }
 
   LaneBodies<S> bodies_;
+  std::array<int, lane_count<S>> last_;
   std::vector<State> state_;
 };
 

@@ -157,28 +157,28 @@ LW_INLINE S accelerate(const EliminatedAxis<S>& axis, const Motion<S>& c, double
 /// Constrained directions of a revolute joint, which is where chains are cut.
 inline constexpr int cut_rows = 5;
 
-/// What unit constraint forces at the outboard cut do to bodies inboard; the elimination carries it
-/// along.
-template <class S>
+/// What unit forces at the outboard cut do to bodies inboard; the elimination carries it along.
+/// rows: those of the cut joint, or six where joints that close loops push there too.
+template <class S, int rows = cut_rows>
 struct CutForces {
-  Force<S> Psi[cut_rows];  ///< on the body at hand
-  S Lambda[15];            ///< at the cut itself, lower triangle by rows
-  S beta[cut_rows];        ///< what the known forces do at the cut
+  Force<S> Psi[rows];               ///< on the body at hand
+  S Lambda[rows * (rows + 1) / 2];  ///< at the cut itself, lower triangle by rows
+  S beta[rows];                     ///< what the known forces do at the cut
 };
 
 /// Across a hinge: row = P^T Psi of the joint, Psi as seen by the parent.
-template <class Place, class S>
+template <class Place, class S, int rows>
 LW_INLINE void carry_cut_forces(const Place& place, const EliminatedAxis<S>& axis,
-                                const Motion<S>& c, CutForces<S>& cut, S* row) {
-  for (int i = 0; i < cut_rows; ++i) {
+                                const Motion<S>& c, CutForces<S, rows>& cut, S* row) {
+  for (int i = 0; i < rows; ++i) {
     const S r = cut.Psi[i].ang.z, scaled = r * axis.D_inverse;
     row[i] = r;
     for (int j = 0; j <= i; ++j) cut.Lambda[packed(i, j)] += scaled * cut.Psi[j].ang.z;
     cut.beta[i] += scaled * axis.h;
   }
   const Force<S> V = axis.D_inverse * axis.U;
-#pragma GCC unroll 5
-  for (int i = 0; i < cut_rows; ++i) {
+#pragma GCC unroll 6
+  for (int i = 0; i < rows; ++i) {
     Force<S>& Psi = cut.Psi[i];
     const S r = Psi.ang.z;
     Psi -= r * V;
@@ -189,11 +189,11 @@ LW_INLINE void carry_cut_forces(const Place& place, const EliminatedAxis<S>& axi
 }
 
 /// For accelerate(): the torque less what the forces f at the outboard cut demand of the joint.
-template <class S>
+template <class S, int rows = cut_rows>
 struct CutTorque {
   const S *row, *f;
   LW_INLINE S less(S h) const {
-    for (int j = 0; j < cut_rows; ++j) h = h - row[j] * f[j];
+    for (int j = 0; j < rows; ++j) h = h - row[j] * f[j];
     return h;
   }
 };
