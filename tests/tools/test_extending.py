@@ -24,9 +24,19 @@ FLAGS = (
     "-DLINKWISE_ASSERTIONS=1",
     "-DLINKWISE_LANES=4",
 )
-#: Sources of the core, and the one of the methods that the programs need.
+#: Sources of the core, and those that programs need beside all that builds a model.
 CORE = "src/linkwise"
-KNOWN_BODIES = "src/linkwise/dynamics/known_bodies.cpp"
+MORE = [
+    f"{CORE}/{name}.cpp"
+    for name in (
+        "dynamics/known_bodies",
+        "dynamics/mobility",
+        "dynamics/quantities",
+        "forces/passive",
+        "kinematics/coupling_states",
+        "kinematics/loop_states",
+    )
+]
 
 pytestmark = pytest.mark.skipif(shutil.which("git") is None, reason="patches need git")
 
@@ -56,7 +66,7 @@ def run_program(program, root):
     text = "".join(f'#include "{path}"\n' for path in paths)
     (root / "core.cpp").write_text(text, encoding="utf-8")
     flags = [flag for flag in FLAGS if flag != "-fsyntax-only"]
-    sources = (program, root / KNOWN_BODIES, "core.cpp")
+    sources = (program, *MORE, "core.cpp")
     run(COMPILER, *flags, "-pthread", "-I", "src", *sources, "-o", "program", cwd=root)
     run(root / "program", cwd=root)
 

@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "linkwise/bodies/own_coordinates.hpp"
 #include "linkwise/bodies/rigid.hpp"
 
 namespace linkwise {
@@ -37,6 +38,7 @@ concept BodyPorts = requires(const B& body, const RigidBody<double>& link, const
   // The pose of a joint starts from its placement. A port that moves on its body must be asked for
   // its frame there first, in calc_general_state().
   requires B::ports_are_fixed;
+  requires !has_coordinates<B> || AnswersForCoordinates<B>;
 };
 
 /// By number, the place of its line in the table.
@@ -52,6 +54,8 @@ struct BodyKindTable {
   static constexpr int size = sizeof...(Kinds);
   static constexpr const char* names[] = {Kinds::name...};
   static constexpr int n_parameters[] = {Kinds::n_parameters...};
+  static constexpr int n_coordinates[] = {Kinds::n_coordinates...};
+  static constexpr bool any_coordinates = (has_coordinates<Kinds> || ...);
   /// Bodies by kind.
   using Bodies = std::tuple<std::vector<Kinds>...>;
 

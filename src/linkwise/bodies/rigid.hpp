@@ -17,6 +17,7 @@ template <class C>
 struct RigidBody {
   static constexpr const char* name = "rigid";
   static constexpr int n_parameters = 0;
+  static constexpr int n_coordinates = 0;  ///< of its own (own_coordinates.hpp)
   static constexpr bool ports_are_fixed = true;
 
   /// A link as a body of this kind, in the link's frame.

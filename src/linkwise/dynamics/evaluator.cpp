@@ -455,6 +455,7 @@ EvaluationReport Evaluator::reduce(size_t count, const double* q, DrivenInverse&
 void Evaluator::mass_matrix(size_t count, const double* q, const Executor& executor, double* H,
                             const GoOn& go_on) const {
   const Model& m = *model_;
+  require_known_bodies(m, find_dynamics("composite_rigid_body"));
   const size_t nv = m.nv();
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);

@@ -125,6 +125,7 @@ constexpr DynamicsEntry table[] = {
      .description = "recursion with articulated inertias, O(N)",
      .reference = "featherstone1983",
      .any_body = true,
+     .own_coordinates = true,
      .linear_time = true,
      .takes_loops = true,
      .on_lanes = BatchMethod::articulated_body,

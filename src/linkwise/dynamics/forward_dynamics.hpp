@@ -54,6 +54,8 @@ struct DynamicsEntry {
   bool uses_solver = false;
   bool chains_only = false;  ///< takes one kind of machine; the others take every tree
   bool any_body = false;     ///< takes bodies of every kind; the others take rigid ones
+  /// Of these kinds, those with coordinates of their own, too.
+  bool own_coordinates = false;
   bool linear_time = false;  ///< work grows as the number of bodies; others: for short chains
   bool takes_loops = false;  ///< takes machines whose joints close loops; the others take trees
   /// What computes many states of a tree side by side, where no solver but thomas is asked for.

@@ -26,7 +26,7 @@ class InverseDynamics {
     const Model& model = *model_;
     in.prescribed = du;
     calc_body_states(model, in, state_.data(), general_.data());
-    base_to_tip(in, du);
+    base_to_tip(in, du, tau);
     tip_to_base(in, tau);
     if (tau && du) {
       const auto& armature = model.dof_values(DofProperty::armature);
@@ -42,7 +42,7 @@ class InverseDynamics {
   const Motion<S>& acceleration(int n) const { return a_[n]; }
 
  private:
-  void base_to_tip(const SweepInput<S>& in, const S* du) {
+  void base_to_tip(const SweepInput<S>& in, const S* du, S* tau) {
     const Model& model = *model_;
     const Motion<S> ground = ground_acceleration<S>(model, in.gravity_factor);
     const auto acceleration_of = [&](int n) -> const Motion<S>& { return a_[n]; };
@@ -58,7 +58,14 @@ class InverseDynamics {
         add_rates(general_[body.general], du, a);
       a_[n] = a;
       w_[n] = {};
-      inward_load(own, a, state_[n].bias, w_[n]);
+      if constexpr (has_coordinates<std::remove_cvref_t<decltype(own)>>) {
+        const int first = model.elements[model.own_element[n]].v;
+        add_own_load(own, state_[n].v, own_state(model, in, n), a, du ? du + first : nullptr, w_[n],
+                     tau ? tau + first : nullptr);
+        w_[n] += state_[n].bias;
+      } else {
+        inward_load(own, a, state_[n].bias, w_[n]);
+      }
     };
     sweep_bodies_outward(model, model.kind_ranges, ground, acceleration_of, step);
   }

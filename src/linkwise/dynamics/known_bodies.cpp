@@ -4,14 +4,25 @@
 
 namespace linkwise {
 
+namespace {
+
+bool takes(const DynamicsEntry& method, BodyKind kind) {
+  if (kind == BodyKind::rigid) return true;
+  return method.any_body &&
+         (method.own_coordinates || BodyKinds::n_coordinates[static_cast<int>(kind)] == 0);
+}
+
+}  // namespace
+
 void require_known_bodies(const Model& model, const DynamicsEntry& method) {
-  if (method.any_body) return;
+  if (!model.own_element.empty()) refuse_loops(model, "a body with coordinates of its own");
+  if (method.own_coordinates) return;
   for (int n = 0; n < model.n_bodies(); ++n) {
     const BodyKind kind = model.topology[n].body_kind;
-    if (kind == BodyKind::rigid) continue;
+    if (takes(method, kind)) continue;
     std::string others;
     for (const DynamicsEntry& entry : dynamics_table())
-      if (entry.any_body) others += (others.empty() ? "" : ", ") + std::string(entry.name);
+      if (takes(entry, kind)) others += (others.empty() ? "" : ", ") + std::string(entry.name);
     throw InputError("body '" + model.body_name(n) + "'" + model.where() + " is of kind " +
                      body_kind_name(kind) + ", which method " + std::string(method.name) +
                      " does not take; use one of " + others);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "linkwise/kinematics/body_columns.hpp"
+#include "linkwise/kinematics/own_states.hpp"
 #include "linkwise/recursion/stack_steps.hpp"
 
 namespace linkwise {
@@ -24,8 +25,9 @@ class Mobility {
   std::span<const double> evaluate(const double* q);
 
  private:
-  bool tip_to_base();
-  void base_to_tip();
+  bool tip_to_base(const SweepInput<double>& in);
+  void base_to_tip(const SweepInput<double>& in);
+  void own_coordinates(const SweepInput<double>& in, int n, const Matrix6<double>& W);
 
   const Model* model_;
   BodyColumns columns_;

@@ -51,6 +51,16 @@ std::vector<BodyState<double>> states_of(const Model& model, const double* q, co
   return states;
 }
 
+/// f(body n), or f(body n, its own state).
+template <class F>
+auto ask_body(const Model& model, const double* q, const double* v, int n, F&& f) {
+  SweepInput<double> in;
+  in.q = q;
+  in.v = v;
+  return with_body(model, n,
+                   [&](const auto& body) { return with_own_state(body, model, in, n, f); });
+}
+
 LoopStates loop_states(const Model& model, const double* q, const double* v) {
   LoopStates loops(model);
   SweepInput<double> in;
@@ -82,8 +92,9 @@ double kinetic_energy(const Model& model, const double* q, const double* v) {
   const auto states = states_of(model, q, v);
   double energy = 0;
   for (int n = 0; n < model.n_bodies(); ++n)
-    energy +=
-        with_body(model, n, [&](const auto& body) { return kinetic_energy(body, states[n].v); });
+    energy += ask_body(model, q, v, n, [&](const auto& body, const auto&... inside) {
+      return kinetic_energy(body, states[n].v, inside...);
+    });
   const auto& armature = model.dof_values(DofProperty::armature);
   for (int i = 0; i < model.nv(); ++i) energy += 0.5 * armature[i] * v[i] * v[i];
   const auto& of_loops = model.loops.dof[static_cast<int>(DofProperty::armature)];
@@ -101,8 +112,9 @@ double potential_energy(const Model& model, const double* q, const double* loop_
         passive_potential(model.loops, loop_q ? loop_q : loop_states(model, q, nullptr).q().data());
   for (int n = 0; n < model.n_bodies(); ++n) {
     const auto& X = frames[model.topology[n].first_element + model.topology[n].n_elements - 1];
-    energy += with_body(model, n,
-                        [&](const auto& body) { return potential_energy(body, X, model.gravity); });
+    energy += ask_body(model, q, nullptr, n, [&](const auto& body, const auto&... inside) {
+      return potential_energy(body, X, model.gravity, inside...);
+    });
   }
   return energy;
 }
@@ -113,8 +125,10 @@ void momentum(const Model& model, const double* q, const double* v, double* h) {
   Force<double> total;
   for (int n = 0; n < model.n_bodies(); ++n) {
     const auto& X = frames[model.topology[n].first_element + model.topology[n].n_elements - 1];
-    total += transpose_times(
-        X, with_body(model, n, [&](const auto& body) { return momentum(body, states[n].v); }));
+    total +=
+        transpose_times(X, ask_body(model, q, v, n, [&](const auto& body, const auto&... inside) {
+                          return momentum(body, states[n].v, inside...);
+                        }));
   }
   const double values[6] = {total.lin.x, total.lin.y, total.lin.z,
                             total.ang.x, total.ang.y, total.ang.z};

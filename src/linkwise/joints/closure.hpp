@@ -70,6 +70,7 @@ inline void one_element(const Element& e, const Transform<double>& X_FE, double*
   double* own = q + e.q;
   switch (e.kind) {
     case ElementKind::fixed:
+    case ElementKind::own:
       break;
     case ElementKind::revolute:
       own[0] = nearest_turn(turn_of(X.R), own[0]);

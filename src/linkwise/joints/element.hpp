@@ -17,7 +17,8 @@ enum class ElementKind : std::uint8_t {
   helical,
   spherical,
   planar,
-  floating
+  floating,
+  own  ///< no motion of a joint: a coordinate of a body's own
 };
 
 /// What a kind has.
@@ -36,6 +37,7 @@ inline constexpr ElementKindInfo element_kind_table[] = {
     {4, 3, 0, 0, nullptr, "1 1 1 1", "rad rad rad"},              // spherical
     {3, 3, -1, 2, "normal", "m m rad", "m m rad"},                // planar
     {7, 6, 3, 3, nullptr, "m m m 1 1 1 1", "m m m rad rad rad"},  // floating
+    {1, 1, -1, 0, nullptr, "1", "1"},                             // own
 };
 constexpr const ElementKindInfo& info_of(ElementKind kind) {
   return element_kind_table[static_cast<int>(kind)];
@@ -110,6 +112,7 @@ LW_INLINE Transform<S> element_pose(const Element& e, const S* q) {
     case ElementKind::floating:
       return Transform<S>{rotation_to_child(own + 3), {own[0], own[1], own[2]}} * e.placement;
     case ElementKind::fixed:
+    case ElementKind::own:
       break;
   }
   return PrismaticJoint::pose(e.placement, 0.0, S{});

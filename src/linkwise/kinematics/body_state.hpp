@@ -8,6 +8,7 @@
 #include <span>
 
 #include "linkwise/kinematics/kind_ranges.hpp"
+#include "linkwise/kinematics/own_states.hpp"
 #include "linkwise/kinematics/sweep_input.hpp"
 #include "linkwise/kinematics/user_frames.hpp"
 
@@ -96,7 +97,9 @@ void calc_body_states(const Model& model, const std::vector<KindRange>& ranges,
       s.c = J::bias(v, k.pitch, u);
       s.v = v;
     }
-    s.bias = momentum_bias(own, s.v);
+    s.bias = with_own_state(own, model, in, n, [&](const auto& it, const auto&... inside) {
+      return momentum_bias(it, s.v, inside...);
+    });
   };
   sweep_bodies_outward(model, ranges, Motion<S>{}, velocity, step);
 }

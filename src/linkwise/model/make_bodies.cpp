@@ -49,6 +49,25 @@ void set_body(const LinkSpec& link, const Inertia<double>& inertia, const Transf
   });
 }
 
+/// Gives coordinates of body b's own their places behind all others, and their properties.
+template <class B>
+void place_coordinates(const B& body, int joint, PlacedJoints& placed, Bodies& out, int b) {
+  if (out.own_element.empty()) out.own_element.assign(out.topology.size(), -1);
+  out.own_element[b] = static_cast<int>(placed.elements.size());
+  for (int k = 0; k < B::n_coordinates; ++k) {
+    Element element;
+    element.kind = ElementKind::own;
+    element.q = placed.nq++;
+    element.v = placed.nv++;
+    element.joint = joint;
+    placed.elements.push_back(element);
+    for (int p = 0; p < n_dof_properties; ++p)
+      placed.dof[p].push_back(dof_property_table[p].fallback);
+    placed.dof[static_cast<int>(DofProperty::stiffness)].back() = body.stiffness(k);
+    placed.dof[static_cast<int>(DofProperty::damping)].back() = body.damping(k);
+  }
+}
+
 }  // namespace
 
 Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const BodyTree& tree,
@@ -80,6 +99,13 @@ Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const Bo
     if (out.singular < 0 && is_singular(lumped.inertia[given.link])) out.singular = b;
     if (body.parent >= 0) ++out.topology[body.parent].n_children;
   }
+  for (int b = 0; BodyKinds::any_coordinates && b < n; ++b)
+    BodyKinds::dispatch(out.topology[b].body_kind, [&](auto kind) {
+      using B = typename decltype(kind)::Body;
+      if constexpr (has_coordinates<B>)
+        place_coordinates(body_of_kind<B>(out.topology[b], out.constants[b], out.others),
+                          joints_of(tree, b).back(), placed, out, b);
+    });
   return out;
 }
 

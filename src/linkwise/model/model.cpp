@@ -59,6 +59,7 @@ Model::Model(ModelSpec given) : spec_(std::move(given)) {
   topology = std::move(bodies.topology);
   constants = std::move(bodies.constants);
   other_bodies = std::move(bodies.others);
+  own_element = std::move(bodies.own_element);
   kind_ranges = ranges_of(topology);
   elements = std::move(placed.elements);
   joints = std::move(placed.joints);

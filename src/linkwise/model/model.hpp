@@ -197,7 +197,9 @@ class Model {
   std::vector<BodyTopology> topology;
   std::vector<BodyConstants<double>> constants;
   BodyKinds::Bodies other_bodies;  ///< that are not rigid
+  /// Of all joints of the tree, then those that stand for coordinates of bodies.
   std::vector<Element> elements;
+  std::vector<int> own_element;  ///< by body, its first one of these, -1: none; empty: no body's
   std::vector<KindRange> kind_ranges;
   std::vector<JointInfo> joints;
   std::vector<LinkInfo> links;

@@ -95,7 +95,7 @@ class TreeSweeps {
         store(b.velocity,
               outward_velocity<J>(place<J>(n), v_parent, k.pitch, in.v ? in.v[at.v] : S{}));
       }
-      b.sum.p = momentum_bias(own, b.velocity);
+      b.sum.p = condensed_bias(own, model_, in, n, b.velocity);
     };
     sweep_bodies_outward(model_, ranges, Motion<S>{}, velocity_of, step);
   }
@@ -105,6 +105,9 @@ class TreeSweeps {
     for (int n = 0; n < model_.n_bodies(); ++n) {
       body_[n].velocity = {};
       body_[n].sum.p = {};
+      where_coordinates(model_, in, n, [&](const auto& body, const auto& inside) {
+        body_[n].sum.p = condense(body, Motion<S>{}, inside).p;
+      });
       const BodyTopology& at = model_.topology[n];
       if (at.joint_kind != JointKind::general) continue;
       BodyState<S> state;
@@ -132,7 +135,7 @@ class TreeSweeps {
       Body& b = body_[n];
       ArticulatedInertia<S> Y{};
       if (at.n_children > 0) Y = b.sum.Y;
-      add_inertia(Y, own);
+      add_condensed(Y, own, model_, in, n, b.velocity);
       if constexpr (is_general<J>) {
         eliminate_stack(in, n, Y, with_loads);
       } else {
@@ -191,6 +194,10 @@ class TreeSweeps {
         const Motion<S> c = J::bias(b.velocity, k.pitch, in.v ? in.v[at.v] : S{});
         du[at.v] = accelerate<J>(b.axis, c, k.pitch, a);
       }
+      where_coordinates(model_, in, n, [&](const auto& body, const auto& inside) {
+        const int first = model_.elements[model_.own_element[n]].v;
+        accelerate_own(body, Motion<S>(b.velocity), inside, a, du + first);
+      });
       store(b.acceleration, a);
     };
     sweep_outward(model_, ranges, ground, acceleration_of, step);
