@@ -1,10 +1,13 @@
-"""What the studies share: their arguments, processes of their own, tables, files."""
+"""What the studies share: arguments, processes of their own, tables, files, and where they ran."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+import platform
 import resource
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -35,6 +38,36 @@ def in_own_process(study: str, *arguments: object) -> Any:
     return json.loads(subprocess.check_output(command, text=True, cwd=ROOT))
 
 
+def processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def commit() -> str:
+    """The sources' commit, with a + when they differ from it; empty where Git does not tell."""
+    if not (ROOT / ".git").exists() or not shutil.which("git"):
+        return ""
+    told = []
+    for command in (["rev-parse", "--short", "HEAD"], ["status", "--porcelain", "-uno", "src"]):
+        done = subprocess.run(
+            ["git", *command], cwd=ROOT, capture_output=True, text=True, check=False
+        )
+        if done.returncode != 0:
+            return ""
+        told.append(done.stdout.strip())
+    return told[0] + ("+" if told[1] else "")
+
+
 def peak_bytes() -> int:
     """The most that this process has held."""
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -55,6 +88,7 @@ def write(folder: Path, study: str, text: str, rows: object, **about: Any) -> No
     folder.mkdir(parents=True, exist_ok=True)
     about = {"versions": versions(), "cpu_target": _core.cpu_target, **about, "rows": rows}
     (folder / f"{study}.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
-    command = f"`python -m benchmarks {study}`"
-    (folder / f"{study}.md").write_text(f"{text}\n\n{command}\n", encoding="utf-8")
+    at = f" at {commit()}" if commit() else ""
+    came = f"`python -m benchmarks {study}`; {processor()}, {cores()} cores; linkwise{at}"
+    (folder / f"{study}.md").write_text(f"{text}\n\n{came}\n", encoding="utf-8")
     print(text)

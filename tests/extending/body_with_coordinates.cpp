@@ -79,7 +79,7 @@ SweepInput<double> input(const double* q, const double* v, const double* tau) {
 /// Coordinate 4, the last one, is the mass's on both machines.
 void compare(const Model& model, const Model& twin) {
   const std::vector<double> q = {0.3, -0.5, 0.7, 1.1, 0.15}, v = {0.7, 1.3, -0.4, 0.9, -1.2};
-  const std::vector<double> tau = {1, -2, 0.5, 0.3, 0.8}, none(5);
+  const std::vector<double> tau = {1, -2, 0.5, 0.3, 0.8};
   std::vector<double> external(18);
   for (size_t i = 0; i < external.size(); ++i) external[i] = 0.1 * static_cast<double>(i) - 0.7;
   std::vector<double> of_twin = external;
@@ -98,8 +98,8 @@ void compare(const Model& model, const Model& twin) {
   recursion.evaluate(at(v.data(), tau, false), du.data(), loads.data());
   other.evaluate(at(v.data(), tau, true), want.data(), want_loads.data());
   same("forward dynamics");
-  recursion.evaluate_again(at(nullptr, none, false), du.data(), loads.data());
-  other.evaluate_again(at(nullptr, none, true), want.data(), want_loads.data());
+  recursion.evaluate_again(at(nullptr, tau, false), du.data(), loads.data());
+  other.evaluate_again(at(nullptr, tau, true), want.data(), want_loads.data());
   same("again, at rest");
   recursion.evaluate_again(at(v.data(), tau, false), du.data(), loads.data());
   other.evaluate_again(at(v.data(), tau, true), want.data(), want_loads.data());

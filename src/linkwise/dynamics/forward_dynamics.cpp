@@ -23,7 +23,17 @@
 namespace linkwise {
 namespace {
 
-/// Methods without unknowns of their own: they succeed, or fail at a body.
+/// Of a kernel, which succeeds, or fails at a body.
+template <class Kernel>
+DynamicsReport report_of(const Kernel& kernel, bool succeeded) {
+  DynamicsReport report;
+  if (succeeded) return report;
+  report.outcome = Outcome::not_positive_definite;
+  report.body = kernel.failed_body();
+  return report;
+}
+
+/// Methods without unknowns of their own.
 template <class Kernel>
 class Recursion : public DynamicsMethod {
  public:
@@ -31,12 +41,7 @@ class Recursion : public DynamicsMethod {
   explicit Recursion(const Model& model, Options... options) : kernel_(model, options...) {}
   DynamicsReport evaluate(double, const SweepInput<double>& in, double* du,
                           double* loads) override {
-    DynamicsReport report;
-    if (!kernel_.evaluate(in, du, loads)) {
-      report.outcome = Outcome::not_positive_definite;
-      report.body = kernel_.failed_body();
-    }
-    return report;
+    return report_of(kernel_, kernel_.evaluate(in, du, loads));
   }
 
   Kernel& kernel() { return kernel_; }
@@ -64,12 +69,7 @@ class FusedConstraintForce : public DynamicsMethod {
   }
   DynamicsReport evaluate(double, const SweepInput<double>& in, double* du,
                           double* loads) override {
-    DynamicsReport report;
-    if (!kernel_.evaluate(in, du, loads, f_.data())) {
-      report.outcome = Outcome::not_positive_definite;
-      report.body = kernel_.failed_body();
-    }
-    return report;
+    return report_of(kernel_, kernel_.evaluate(in, du, loads, f_.data()));
   }
   std::span<const double> constraint_force() const override { return f_; }
 
@@ -83,13 +83,9 @@ class ClosedLoops : public DynamicsMethod {
   explicit ClosedLoops(const Model& model) : kernel_(model) {}
   DynamicsReport evaluate(double, const SweepInput<double>& in, double* du,
                           double* loads) override {
-    DynamicsReport report;
-    if (!kernel_.evaluate(in, du, loads)) {
-      report.outcome = Outcome::not_positive_definite;
-      report.body = kernel_.failed_body();
-    } else if (kernel_.report().is_contradictory()) {
+    DynamicsReport report = report_of(kernel_, kernel_.evaluate(in, du, loads));
+    if (report.ok() && kernel_.report().is_contradictory())
       report.outcome = Outcome::singular_position;
-    }
     report.loops = kernel_.report();
     if (loads) kernel_.coupling_loads(in.q, coupling_load_);
     return report;

@@ -52,6 +52,8 @@ class Cvode final : public Integrator {
   Outcome no_smaller_step() const;
   static int right_hand_side(sunrealtype t, N_Vector y, N_Vector ydot, void* self);
   static int error_weights(N_Vector y, N_Vector weight, void* self);
+  template <class F>
+  static int answer(void* self, F&& f);
   static int projection(sunrealtype t, N_Vector y, N_Vector correction, sunrealtype tolerance,
                         N_Vector error, void* self);
   Outcome project(double t, const double* y);
@@ -130,13 +132,13 @@ void Cvode::attach_solvers(int method) {
   check(CVodeSetLinearSolver(memory, linear_solver_.get(), matrix_.get()), "CVodeSetLinearSolver");
 }
 
-int Cvode::right_hand_side(sunrealtype t, N_Vector y, N_Vector ydot, void* self) {
+/// What CVODE's callbacks share: f(cvode) gives an outcome.
+template <class F>
+int Cvode::answer(void* self, F&& f) {
   Cvode& cvode = *static_cast<Cvode*>(self);
   // Exceptions must not unwind through C.
   try {
-    double* rate = N_VGetArrayPointer(ydot);
-    if (cvode.size() == 0) *rate = 0.0;
-    const Outcome outcome = cvode.system_.evaluate(t, N_VGetArrayPointer(y), rate);
+    const Outcome outcome = f(cvode);
     if (outcome == Outcome::converged) return 0;
     cvode.failure_ = outcome;
     cvode.steps_since_failure_ = 0;
@@ -147,25 +149,25 @@ int Cvode::right_hand_side(sunrealtype t, N_Vector y, N_Vector ydot, void* self)
   }
 }
 
+int Cvode::right_hand_side(sunrealtype t, N_Vector y, N_Vector ydot, void* self) {
+  return answer(self, [&](Cvode& cvode) {
+    double* rate = N_VGetArrayPointer(ydot);
+    if (cvode.size() == 0) *rate = 0.0;
+    return cvode.system_.evaluate(t, N_VGetArrayPointer(y), rate);
+  });
+}
+
 /// The projection of bdf, whose history holds earlier y: CVODE corrects it with y.
 int Cvode::projection(sunrealtype t, N_Vector y, N_Vector correction, sunrealtype /*tolerance*/,
                       N_Vector /*error*/, void* self) {
-  Cvode& cvode = *static_cast<Cvode*>(self);
-  try {
+  return answer(self, [&](Cvode& cvode) {
     const double* unprojected = N_VGetArrayPointer(y);
     const Outcome outcome = cvode.project(t, unprojected);
-    if (outcome == Outcome::converged) {
-      double* c = N_VGetArrayPointer(correction);
-      for (std::size_t i = 0; i < cvode.size(); ++i) c[i] = cvode.projected_[i] - unprojected[i];
-      return 0;
-    }
-    cvode.failure_ = outcome;
-    cvode.steps_since_failure_ = 0;
-    return 1;  // positive: CVODE tries again with a smaller step
-  } catch (...) {
-    cvode.exception_ = std::current_exception();
-    return -1;
-  }
+    double* c = N_VGetArrayPointer(correction);
+    for (std::size_t i = 0; outcome == Outcome::converged && i < cvode.size(); ++i)
+      c[i] = cvode.projected_[i] - unprojected[i];
+    return outcome;
+  });
 }
 
 /// y at time t into projected_.
