@@ -143,12 +143,20 @@ double LoopProjection::stop(const double* q, double least, double* v) {
   return before;
 }
 
-Outcome LoopProjection::project(double* q, double* v) {
+/// Closing a weak direction moves coordinates by its gap over the root of its pivot, which is also
+/// how far the machine is from a singular position: the one has to be small beside the other.
+double LoopProjection::least_to_close(int stage, double open) const {
+  return stage == 0 ? faintest_ : stage == 1 ? weakest_ : std::clamp(10 * open, null, weakest_);
+}
+
+Outcome LoopProjection::project(double* q, double* v, bool closely) {
+  const double enough = closely ? closed : drift;
   q_.assign(q, q + model_.nq());
   const double start = gap(q_.data());
   if (!std::isfinite(start)) return Outcome::not_finite;
   double open = start;
-  for (const double least : {faintest_, weakest_}) {
+  for (int stage = 0; stage < 3 && (stage == 0 || open > enough); ++stage) {
+    const double least = least_to_close(stage, open);
     for (int k = 0; k < most_steps && open > closed; ++k) {
       if (!close(q_.data(), least, du_.data())) return Outcome::not_positive_definite;
       move_by(model_, du_.data(), q_.data());
@@ -156,15 +164,13 @@ Outcome LoopProjection::project(double* q, double* v) {
       open = gap(q_.data());
       if (!(open < 0.5 * before)) break;  // rounding, or what weak directions leave
     }
-    if (!(open > drift)) break;
   }
-  if (!(open <= std::max(2 * start, 1e-10))) return Outcome::singular_position;
+  if (!(open <= std::max(std::min(2 * start, 1e-8), 1e-10))) return Outcome::singular_position;
   if (v) {
     v_.assign(v, v + model_.nv());
-    for (const double least : {faintest_, weakest_}) {
-      if (!std::isfinite(stop(q_.data(), least, v_.data()))) return Outcome::not_finite;
-      if (!(slip(q_.data(), v_.data()) > drift)) break;
-    }
+    for (int stage = 0; stage < 3 && (stage == 0 || slip(q_.data(), v_.data()) > enough); ++stage)
+      if (!std::isfinite(stop(q_.data(), least_to_close(stage, open), v_.data())))
+        return Outcome::not_finite;
     std::copy(v_.begin(), v_.end(), v);
   }
   std::copy(q_.begin(), q_.end(), q);

@@ -42,8 +42,9 @@ class LoopProjection {
   /// long row of loops some may be missed.
   int lost_at_start() const { return std::max(0, full_ - at_start_); }
 
-  /// q [nq], v [nv]; v may be null. Any outcome but `converged` leaves both as they were.
-  Outcome project(double* q, double* v);
+  /// q [nq], v [nv]; v may be null. Any outcome but `converged` leaves both as they were. closely:
+  /// weak directions are closed, too, however little they are open.
+  Outcome project(double* q, double* v, bool closely = false);
 
   /// How far the loops are open at q: shifts over the loop's length, and turns, root of the sum of
   /// squares.
@@ -62,6 +63,7 @@ class LoopProjection {
   double miss(const double* q, const double* v);
   LoopReport report_at(const double* q);
   bool respond(const double* q, double least, double* du);
+  double least_to_close(int stage, double open) const;
 
   SweepInput<double> input(const double* q, const double* v) const;
 

@@ -8,15 +8,28 @@ namespace linkwise {
 namespace {
 
 constexpr size_t points = 8, fewest_points = 4;
-/// A machine that stays this long stands in a singular position, and may leave it in several ways.
+/// A machine that stays this long stands in a singular position, and may leave it in several ways,
+/// or its loops are weak for long.
 constexpr int most_steps_inside = 20;
+/// Gaps and slips that rounding leaves.
+constexpr double least_gap = 1e-15;
+/// What the constraints demand is followed as long as pivots are larger: four digits remain of it.
+constexpr double least_pivot = 1e-8;
+
+double largest(const std::vector<double>& x) {
+  double most = 0;
+  for (const double own : x) most = std::max(most, std::abs(own));
+  return most;
+}
 
 }  // namespace
 
-void Coasting::start(int full) {
+void Coasting::start(int full, double tolerance) {
   full_ = full;
-  inside_ = remembered_ = false;
-  steps_inside_ = 0;
+  rank_ = full;
+  tolerance_ = tolerance;
+  inside_ = remembered_ = follows_ = false;
+  steps_inside_ = steps_outside_ = 0;
   known_.clear();
   pivots_.clear();
   passed_ = std::numeric_limits<double>::quiet_NaN();
@@ -26,14 +39,20 @@ Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, std:
                         bool remember, bool known) {
   if (outcome != Outcome::converged && outcome != Outcome::singular_position) return outcome;
   full_ = std::max(full_, loops.strong);
+  rank_ = std::max(rank_, loops.rank);
   const bool inside = loops.strong < full_;
   if (remember) {
     inside_ = inside;
-    remembered_ = !inside && outcome == Outcome::converged;
+    remembered_ = (!inside || follows_) && outcome == Outcome::converged;
     if (remembered_) last_ = {t, dv};
     last_pivot_ = {t, inside ? 0 : loops.smallest_pivot};
   }
-  if (!inside || (!known && known_.size() < fewest_points)) return outcome;
+  if (!inside) return outcome;
+  if (follows_) {
+    const bool lost = loops.rank < rank_ || loops.smallest_pivot < least_pivot;
+    return lost ? Outcome::singular_position : outcome;
+  }
+  if (!known && known_.size() < fewest_points) return outcome;
   if (steps_inside_ > most_steps_inside) return Outcome::singular_position;
   if (known) return Outcome::converged;
   extrapolate(t, dv);
@@ -41,11 +60,42 @@ Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, std:
 }
 
 void Coasting::accepted() {
-  steps_inside_ = inside_ ? steps_inside_ + 1 : 0;
+  steps_inside_ = inside_ && !follows_ ? steps_inside_ + 1 : 0;
+  steps_outside_ = inside_ ? 0 : steps_outside_ + 1;
+  if (steps_outside_ > 1) follows_ = false;  // samples of the step that leaves come later
   find_passage();
   if (!remembered_ || (!known_.empty() && !(last_.t > known_.back().t))) return;
   known_.push_back(last_);
   if (known_.size() > points) known_.pop_front();
+}
+
+/// What rounding does to accelerations that the constraints demand. At a distance d from a singular
+/// position, which is the root of the least pivot, a gap moves coordinates by 1 / d of it, rates by
+/// 1 / d^2 and accelerations by 1 / d^3. In a row of loops all those that are nearly singular add.
+double Coasting::noise(const Demand& demand) const {
+  if (demand.loops.rank < rank_) return std::numeric_limits<double>::infinity();
+  const double size = std::max(demand.fastest * demand.fastest, largest(demand.dv));
+  const int weak = std::max(1, full_ - demand.loops.strong);
+  return weak * std::max(demand.loops.open, least_gap) * size /
+         std::pow(demand.loops.smallest_pivot, 1.5);
+}
+
+bool Coasting::differs(const Demand& demand, const std::vector<double>& other) const {
+  const double within = 30 * noise(demand) + 10 * tolerance_ * std::max(1.0, largest(demand.dv));
+  for (size_t i = 0; i < other.size(); ++i)
+    if (std::abs(demand.dv[i] - other[i]) > within) return true;
+  return false;
+}
+
+void Coasting::compare(double t, const Demand& demand, const std::vector<double>* beside) {
+  if (follows_) return;
+  if (!beside && known_.size() < fewest_points) return;
+  if (!beside) {
+    expected_.resize(demand.dv.size());
+    extrapolate(t, expected_);
+  }
+  const bool stays = steps_inside_ > most_steps_inside && noise(demand) < 1e-3 * largest(demand.dv);
+  follows_ = stays || differs(demand, beside ? *beside : expected_);
 }
 
 /// Where the parabola through the last three pivots comes down to less than a twentieth of the

@@ -262,8 +262,7 @@ Outcome Simulation::evaluate_by(DynamicsMethod* method, double t, const double* 
   }
   calc_position_rates(y, rates_in(y), ydot);
   Outcome outcome = accelerations(method, t, y, dv, nullptr);
-  const bool from_beside = loops_ && coasting_.is_near(loop_report_) &&
-                           accelerate_from_beside(method, t, y, rates_in(y), dv);
+  const bool from_beside = loops_ && accelerate_from_beside(method, t, y, rates_in(y), outcome, dv);
   for (size_t i = 0; i < members_; ++i)
     parent_axes_.derivative_from_child(y + i * nq(), rates_in(y) + i * nv(), dv + i * nv());
   if (loops_) outcome = steer(t, outcome, dv, method == method_.get(), from_beside);
@@ -299,7 +298,7 @@ void Simulation::accepted(double t, const double* y) {
     solver_tolerance_->accepted(t, y, rates_in(y));
   }
   if (method_) method_->accepted(t);
-  if (loops_) coasting_.accepted();
+  if (loops_) coast_on(t, y);
   if (forces_->loops()) count_turns(t, y);
   watch_step(t, y);
 }

@@ -152,7 +152,10 @@ class Simulation : private OdeSystem {
   }
   Outcome steer(double t, Outcome outcome, double* dv, bool remember, bool known);
   bool accelerate_from_beside(DynamicsMethod* method, double t, const double* q, const double* v,
-                              double* du);
+                              Outcome outcome, double* du);
+  LoopReport accelerate_closed(DynamicsMethod* method, double t, const double* q, const double* v,
+                               bool closely, double* du);
+  void coast_on(double t, const double* y);
   Outcome steer_sample(double t, Outcome outcome);
   void evaluate_for(Extremes& extremes);
   bool evaluate_at(double t, const double* q, const double* v, double* du, double* loads,

@@ -10,6 +10,16 @@
 #include "linkwise/simulate/simulation.hpp"
 
 namespace linkwise {
+namespace {
+
+double fastest_of(const double* v, int n) {
+  double fastest = 0;
+  for (int i = 0; i < n; ++i) fastest = std::max(fastest, std::abs(v[i]));
+  return fastest;
+}
+
+}  // namespace
+
 void Simulation::close_loops(double t0, const std::vector<std::string>& hold) {
   loops_.reset();
   assembled_.clear();
@@ -55,7 +65,9 @@ void Simulation::begin_coasting() {
                      " starts at rest in a singular position, where its loops hold fewer "
                      "directions than beside it: it may move on in several ways; start it beside "
                      "that position, or with rates");
-  coasting_.start(loops_->full_rank());
+  const IntegratorOptions& o = setup_->options.integration;
+  coasting_.start(loops_->full_rank(),
+                  o.relative_tolerance > 0 ? o.relative_tolerance : o.tolerance);
 }
 
 /// The state of joints of given motion is not integrated, and stays.
@@ -67,7 +79,7 @@ Outcome Simulation::project(double t, double* y) {
   to_state(q);
   impose(t, q);
   if (LoopForces* forces = forces_->loops()) forces->give(t);
-  const Outcome outcome = loops_->project(q, v);
+  const Outcome outcome = loops_->project(q, v, coasting_.follows());
   if (outcome != Outcome::converged) {
     failure_ = {outcome, t, "", described(outcome)};
     return outcome;
@@ -90,47 +102,79 @@ Outcome Simulation::steer(double t, Outcome outcome, double* dv, bool remember, 
   return outcome;
 }
 
-/// The accelerations in a singular position, or near one, of those beside it: along the path on
-/// which the machine goes they are smooth. They are taken at eight positions before and behind, and
-/// those of the polynomial of degree 7 through them. False where these are not known either, and
-/// where steps are so short that those before serve as well: rounding errors come out less of them.
-bool Simulation::accelerate_from_beside(DynamicsMethod* method, double t, const double* q,
-                                        const double* v, double* du) {
-  constexpr double apart = 0.012, near = 0.15;  // rad, or m
-  constexpr double weights[] = {0.8, -0.4, 4.0 / 35, -1.0 / 70};
-  const int n = static_cast<int>(nv());
-  double fastest = 0;
-  for (int i = 0; i < n; ++i) fastest = std::max(fastest, std::abs(v[i]));
-  if (!(fastest > 0) || setup_->any_given()) return false;
-  if (fastest * coasting_.reaches_back(t) < near) return false;
+/// What the constraints demand beside a state, or in it, once its loops are closed there. `strong`
+/// is 0 where they cannot be. The report of the last evaluation stays what it is.
+LoopReport Simulation::accelerate_closed(DynamicsMethod* method, double t, const double* q,
+                                         const double* v, bool closely, double* du) {
   const LoopReport own = loop_report_;
-  std::vector<double> sum(nv()), way(nv()), q_beside, v_beside, du_beside(nv());
-  bool known = true;
-  for (int k = 0; k < 8 && known; ++k) {
-    const int steps = k / 2 + 1;
-    for (int i = 0; i < n; ++i) way[i] = (k % 2 == 0 ? apart : -apart) * steps * v[i] / fastest;
-    q_beside.assign(q, q + nq());
-    v_beside.assign(v, v + nv());
-    move_by(model(), way.data(), q_beside.data());
-    known = loops_->project(q_beside.data(), v_beside.data()) == Outcome::converged;
-    if (!known) break;
+  std::vector<double> at(q, q + nq()), rates(v, v + nv());
+  LoopReport found;
+  if (loops_->project(at.data(), rates.data(), closely) == Outcome::converged) {
     const DynamicsReport report =
-        method->evaluate(t, input(t, q_beside.data(), v_beside.data()), du_beside.data(), nullptr);
-    known = report.ok() && !coasting_.is_near(report.loops);
-    for (int i = 0; i < n; ++i) sum[i] += weights[steps - 1] * du_beside[i];
+        method->evaluate(t, input(t, at.data(), rates.data()), du, nullptr);
+    if (report.ok()) found = report.loops;
   }
   input(t, q, v);  // what acts is that of the state itself
   loop_report_ = own;
-  if (known) std::copy(sum.begin(), sum.end(), du);
-  return known;
+  return found;
+}
+
+/// The accelerations in a singular position, or near one, of those beside it: along the path on
+/// which the machine goes they are smooth. They are taken at eight positions before and behind, and
+/// those of the polynomial of degree 7 through them. Those of the state, du, stay if they are known
+/// well enough to tell that they differ. False where these are not known either, and where steps
+/// are so short that those before serve as well: rounding errors come out less of them.
+bool Simulation::accelerate_from_beside(DynamicsMethod* method, double t, const double* q,
+                                        const double* v, Outcome outcome, double* du) {
+  constexpr double apart = 0.012, near = 0.15;  // rad, or m
+  constexpr double weights[] = {0.8, -0.4, 4.0 / 35, -1.0 / 70};
+  if (!coasting_.is_near(loop_report_) || coasting_.follows()) return false;
+  const int n = static_cast<int>(nv());
+  const double fastest = fastest_of(v, n);
+  if (!(fastest > 0) || setup_->any_given()) return false;
+  if (fastest * coasting_.reaches_back(t) < near) return false;
+  std::vector<double> sum(nv()), way(nv()), beside, du_beside(nv());
+  for (int k = 0; k < 8; ++k) {
+    const int steps = k / 2 + 1;
+    for (int i = 0; i < n; ++i) way[i] = (k % 2 == 0 ? apart : -apart) * steps * v[i] / fastest;
+    beside.assign(q, q + nq());
+    move_by(model(), way.data(), beside.data());
+    const LoopReport report =
+        accelerate_closed(method, t, beside.data(), v, false, du_beside.data());
+    if (coasting_.is_near(report)) return false;
+    for (int i = 0; i < n; ++i) sum[i] += weights[steps - 1] * du_beside[i];
+  }
+  const LoopReport report = accelerate_closed(method, t, q, v, true, du_beside.data());
+  if (report.strong > 0 && coasting_.differs({report, fastest, du_beside}, sum))
+    return outcome == Outcome::converged;
+  std::copy(sum.begin(), sum.end(), du);
+  return true;
+}
+
+/// Of an accepted state.
+void Simulation::coast_on(double t, const double* y) {
+  coasting_.accepted();
+  if (!coasting_.is_inside() || coasting_.follows()) return;
+  projected_.assign(y, y + size());
+  double *q = projected_.data(), *v = rates_in(q);
+  to_state(q);
+  impose(t, q);
+  if (!aside_method_) aside_method_ = make_dynamics(setup_->driven(), setup_->options.dynamics);
+  std::vector<double> own(nv()), beside(nv());
+  const LoopReport report = accelerate_closed(aside_method_.get(), t, q, v, true, own.data());
+  if (report.strong == 0) return;
+  const bool known = accelerate_from_beside(aside_method_.get(), t, q, v,
+                                            Outcome::singular_position, beside.data());
+  for (auto* du : {&own, &beside}) parent_axes_.derivative_from_child(q, v, du->data());
+  coasting_.compare(t, {report, fastest_of(v, static_cast<int>(nv())), own},
+                    known ? &beside : nullptr);
 }
 
 /// The same of du_ and y_, which hold a state's rates.
 Outcome Simulation::steer_sample(double t, Outcome outcome) {
   if (outcome == Outcome::converged && loop_report_.strong >= loops_->full_rank()) return outcome;
   const double *q = y_.data(), *v = rates_in(q);
-  const bool known = coasting_.is_near(loop_report_) &&
-                     accelerate_from_beside(output_method_.get(), t, q, v, du_.data());
+  const bool known = accelerate_from_beside(output_method_.get(), t, q, v, outcome, du_.data());
   parent_axes_.derivative_from_child(q, v, du_.data());
   outcome = steer(t, outcome, du_.data(), false, known);
   parent_axes_.derivative_to_child(q, v, du_.data());
