@@ -35,8 +35,8 @@ void Coasting::start(int full, double tolerance) {
   passed_ = std::numeric_limits<double>::quiet_NaN();
 }
 
-Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, std::vector<double>& dv,
-                        bool remember, bool known) {
+Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, const Aside& aside,
+                        std::vector<double>& dv, bool remember) {
   if (outcome != Outcome::converged && outcome != Outcome::singular_position) return outcome;
   full_ = std::max(full_, loops.strong);
   rank_ = std::max(rank_, loops.rank);
@@ -52,10 +52,9 @@ Outcome Coasting::steer(double t, const LoopReport& loops, Outcome outcome, std:
     const bool lost = loops.rank < rank_ || loops.smallest_pivot < least_pivot;
     return lost ? Outcome::singular_position : outcome;
   }
-  if (!known && known_.size() < fewest_points) return outcome;
+  if (!guess(t, aside, expected_)) return outcome;
   if (steps_inside_ > most_steps_inside) return Outcome::singular_position;
-  if (known) return Outcome::converged;
-  extrapolate(t, dv);
+  dv = differs(aside, expected_) ? aside.demand : expected_;
   return Outcome::converged;
 }
 
@@ -72,30 +71,39 @@ void Coasting::accepted() {
 /// What rounding does to accelerations that the constraints demand. At a distance d from a singular
 /// position, which is the root of the least pivot, a gap moves coordinates by 1 / d of it, rates by
 /// 1 / d^2 and accelerations by 1 / d^3. In a row of loops all those that are nearly singular add.
-double Coasting::noise(const Demand& demand) const {
-  if (demand.loops.rank < rank_) return std::numeric_limits<double>::infinity();
-  const double size = std::max(demand.fastest * demand.fastest, largest(demand.dv));
-  const int weak = std::max(1, full_ - demand.loops.strong);
-  return weak * std::max(demand.loops.open, least_gap) * size /
-         std::pow(demand.loops.smallest_pivot, 1.5);
+double Coasting::noise(const Aside& aside) const {
+  if (aside.loops.rank < rank_) return std::numeric_limits<double>::infinity();
+  const double size = std::max(aside.fastest * aside.fastest, largest(aside.demand));
+  const int weak = std::max(1, full_ - aside.loops.strong);
+  return weak * std::max(aside.loops.open, least_gap) * size /
+         std::pow(aside.loops.smallest_pivot, 1.5);
 }
 
-bool Coasting::differs(const Demand& demand, const std::vector<double>& other) const {
-  const double within = 30 * noise(demand) + 10 * tolerance_ * std::max(1.0, largest(demand.dv));
+/// False where nothing is known.
+bool Coasting::guess(double t, const Aside& aside, std::vector<double>& dv) const {
+  if (aside.beside.empty() && known_.size() < fewest_points) return false;
+  dv = aside.beside;
+  if (!dv.empty()) return true;
+  dv.resize(known_.back().dv.size());
+  extrapolate(t, dv);
+  return true;
+}
+
+/// Whether `other` accelerations differ from those demanded by more than rounding errors and the
+/// tolerance do.
+bool Coasting::differs(const Aside& aside, const std::vector<double>& other) const {
+  if (aside.loops.strong == 0) return false;
+  const double within = 30 * noise(aside) + 10 * tolerance_ * std::max(1.0, largest(aside.demand));
   for (size_t i = 0; i < other.size(); ++i)
-    if (std::abs(demand.dv[i] - other[i]) > within) return true;
+    if (std::abs(aside.demand[i] - other[i]) > within) return true;
   return false;
 }
 
-void Coasting::compare(double t, const Demand& demand, const std::vector<double>* beside) {
-  if (follows_) return;
-  if (!beside && known_.size() < fewest_points) return;
-  if (!beside) {
-    expected_.resize(demand.dv.size());
-    extrapolate(t, expected_);
-  }
-  const bool stays = steps_inside_ > most_steps_inside && noise(demand) < 1e-3 * largest(demand.dv);
-  follows_ = stays || differs(demand, beside ? *beside : expected_);
+void Coasting::compare(double t, const Aside& aside) {
+  if (aside.loops.strong == 0 || !guess(t, aside, expected_)) return;
+  const bool stays =
+      steps_inside_ > most_steps_inside && noise(aside) < 1e-3 * largest(aside.demand);
+  follows_ = stays || differs(aside, expected_);
 }
 
 /// Where the parabola through the last three pivots comes down to less than a twentieth of the

@@ -23,27 +23,26 @@ class Coasting {
   /// tolerance: of the integration.
   void start(int full, double tolerance);
 
+  /// What is known of accelerations near a singular position beside those of the evaluation.
+  struct Aside {
+    LoopReport loops;    ///< at the state, once its loops are closed; `strong` is 0: unknown
+    double fastest = 0;  ///< rate, rad/s or m/s
+    std::vector<double> demand;  ///< what the constraints demand there
+    std::vector<double> beside;  ///< by states beside; empty: unknown
+  };
+
   /// Replaces the accelerations dv at time t where the loops are nearly singular, and returns what
-  /// becomes of the outcome. remember: of the integration itself; known: they are known already.
-  Outcome steer(double t, const LoopReport& loops, Outcome outcome, std::vector<double>& dv,
-                bool remember, bool known = false);
+  /// becomes of the outcome. remember: of the integration itself.
+  Outcome steer(double t, const LoopReport& loops, Outcome outcome, const Aside& aside,
+                std::vector<double>& dv, bool remember);
   /// Whether that holds.
   bool is_near(const LoopReport& loops) const { return loops.strong < full_; }
   /// Whether the last evaluation of the integration was so.
   bool is_inside() const { return inside_; }
   /// Whether the machine follows what the constraints demand in the window, too.
   bool follows() const { return follows_; }
-  /// What is known of accelerations at a state that closes the loops.
-  struct Demand {
-    const LoopReport& loops;
-    double fastest;  ///< rate, rad/s or m/s
-    const std::vector<double>& dv;
-  };
-  /// Whether `other` accelerations there differ by more than rounding errors and tolerance do.
-  bool differs(const Demand& demand, const std::vector<double>& other) const;
-  /// Looks at an accepted state of the window at time t. beside: accelerations from beside, or
-  /// null.
-  void compare(double t, const Demand& demand, const std::vector<double>* beside);
+  /// Looks at an accepted state of the window at time t.
+  void compare(double t, const Aside& aside);
   /// How long ago the accelerations before begin, s; infinite: there are too few. 0 after some
   /// steps inside: what is short enough for these will do.
   double reaches_back(double t) const;
@@ -64,7 +63,9 @@ class Coasting {
     double t, value;
   };
 
-  double noise(const Demand& demand) const;
+  double noise(const Aside& aside) const;
+  bool guess(double t, const Aside& aside, std::vector<double>& dv) const;
+  bool differs(const Aside& aside, const std::vector<double>& other) const;
   void extrapolate(double t, std::vector<double>& dv) const;
   void find_passage();
 

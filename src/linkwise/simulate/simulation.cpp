@@ -262,10 +262,11 @@ Outcome Simulation::evaluate_by(DynamicsMethod* method, double t, const double* 
   }
   calc_position_rates(y, rates_in(y), ydot);
   Outcome outcome = accelerations(method, t, y, dv, nullptr);
-  const bool from_beside = loops_ && accelerate_from_beside(method, t, y, rates_in(y), outcome, dv);
+  const Coasting::Aside aside =
+      loops_ ? demanded_aside(method, t, y, rates_in(y)) : Coasting::Aside{};
   for (size_t i = 0; i < members_; ++i)
     parent_axes_.derivative_from_child(y + i * nq(), rates_in(y) + i * nv(), dv + i * nv());
-  if (loops_) outcome = steer(t, outcome, dv, method == method_.get(), from_beside);
+  if (loops_) outcome = steer(t, outcome, aside, dv, method == method_.get());
   for (size_t i = 0; i < members_ && (given || any_ended()); ++i) {
     if (members_ > 1 && !endings_[i].ok()) {
       std::fill_n(ydot + i * nq(), nq(), 0.0);

@@ -150,11 +150,13 @@ class Simulation : private OdeSystem {
   void report_accepted() {
     if (observer_) observer_->accepted();
   }
-  Outcome steer(double t, Outcome outcome, double* dv, bool remember, bool known);
-  bool accelerate_from_beside(DynamicsMethod* method, double t, const double* q, const double* v,
-                              Outcome outcome, double* du);
+  Outcome steer(double t, Outcome outcome, const Coasting::Aside& aside, double* dv, bool remember);
+  std::vector<double> accelerate_beside(DynamicsMethod* method, double t, const double* q,
+                                        const double* v, double fastest);
   LoopReport accelerate_closed(DynamicsMethod* method, double t, const double* q, const double* v,
                                bool closely, double* du);
+  Coasting::Aside demanded_aside(DynamicsMethod* method, double t, const double* q,
+                                 const double* v);
   void coast_on(double t, const double* y);
   Outcome steer_sample(double t, Outcome outcome);
   void evaluate_for(Extremes& extremes);

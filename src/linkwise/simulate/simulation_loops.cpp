@@ -10,16 +10,6 @@
 #include "linkwise/simulate/simulation.hpp"
 
 namespace linkwise {
-namespace {
-
-double fastest_of(const double* v, int n) {
-  double fastest = 0;
-  for (int i = 0; i < n; ++i) fastest = std::max(fastest, std::abs(v[i]));
-  return fastest;
-}
-
-}  // namespace
-
 void Simulation::close_loops(double t0, const std::vector<std::string>& hold) {
   loops_.reset();
   assembled_.clear();
@@ -95,9 +85,10 @@ Outcome Simulation::project(double t, double* y) {
 }
 
 /// dv: derivative of the rates of the integrator's y.
-Outcome Simulation::steer(double t, Outcome outcome, double* dv, bool remember, bool known) {
+Outcome Simulation::steer(double t, Outcome outcome, const Coasting::Aside& aside, double* dv,
+                          bool remember) {
   steered_.assign(dv, dv + nv());
-  outcome = coasting_.steer(t, loop_report_, outcome, steered_, remember, known);
+  outcome = coasting_.steer(t, loop_report_, outcome, aside, steered_, remember);
   std::copy(steered_.begin(), steered_.end(), dv);
   return outcome;
 }
@@ -121,34 +112,41 @@ LoopReport Simulation::accelerate_closed(DynamicsMethod* method, double t, const
 
 /// The accelerations in a singular position, or near one, of those beside it: along the path on
 /// which the machine goes they are smooth. They are taken at eight positions before and behind, and
-/// those of the polynomial of degree 7 through them. Those of the state, du, stay if they are known
-/// well enough to tell that they differ. False where these are not known either, and where steps
-/// are so short that those before serve as well: rounding errors come out less of them.
-bool Simulation::accelerate_from_beside(DynamicsMethod* method, double t, const double* q,
-                                        const double* v, Outcome outcome, double* du) {
+/// those of the polynomial of degree 7 through them. Empty where these are not known either, and
+/// where steps are so short that those before serve as well: rounding errors come out less of them.
+std::vector<double> Simulation::accelerate_beside(DynamicsMethod* method, double t, const double* q,
+                                                  const double* v, double fastest) {
   constexpr double apart = 0.012, near = 0.15;  // rad, or m
   constexpr double weights[] = {0.8, -0.4, 4.0 / 35, -1.0 / 70};
-  if (!coasting_.is_near(loop_report_) || coasting_.follows()) return false;
-  const int n = static_cast<int>(nv());
-  const double fastest = fastest_of(v, n);
-  if (!(fastest > 0) || setup_->any_given()) return false;
-  if (fastest * coasting_.reaches_back(t) < near) return false;
-  std::vector<double> sum(nv()), way(nv()), beside, du_beside(nv());
+  if (!(fastest > 0) || setup_->any_given()) return {};
+  if (fastest * coasting_.reaches_back(t) < near) return {};
+  std::vector<double> sum(nv()), way(nv()), beside, du(nv());
   for (int k = 0; k < 8; ++k) {
     const int steps = k / 2 + 1;
-    for (int i = 0; i < n; ++i) way[i] = (k % 2 == 0 ? apart : -apart) * steps * v[i] / fastest;
+    for (size_t i = 0; i < nv(); ++i)
+      way[i] = (k % 2 == 0 ? apart : -apart) * steps * v[i] / fastest;
     beside.assign(q, q + nq());
     move_by(model(), way.data(), beside.data());
-    const LoopReport report =
-        accelerate_closed(method, t, beside.data(), v, false, du_beside.data());
-    if (coasting_.is_near(report)) return false;
-    for (int i = 0; i < n; ++i) sum[i] += weights[steps - 1] * du_beside[i];
+    const LoopReport report = accelerate_closed(method, t, beside.data(), v, false, du.data());
+    if (coasting_.is_near(report)) return {};
+    for (size_t i = 0; i < nv(); ++i) sum[i] += weights[steps - 1] * du[i];
   }
-  const LoopReport report = accelerate_closed(method, t, q, v, true, du_beside.data());
-  if (report.strong > 0 && coasting_.differs({report, fastest, du_beside}, sum))
-    return outcome == Outcome::converged;
-  std::copy(sum.begin(), sum.end(), du);
-  return true;
+  return sum;
+}
+
+/// In the integrator's axes; nothing where the machine is far from a singular position.
+Coasting::Aside Simulation::demanded_aside(DynamicsMethod* method, double t, const double* q,
+                                           const double* v) {
+  Coasting::Aside aside;
+  if (!coasting_.is_near(loop_report_) || coasting_.follows()) return aside;
+  aside.fastest = 0;
+  for (size_t i = 0; i < nv(); ++i) aside.fastest = std::max(aside.fastest, std::abs(v[i]));
+  aside.beside = accelerate_beside(method, t, q, v, aside.fastest);
+  aside.demand.resize(nv());
+  aside.loops = accelerate_closed(method, t, q, v, true, aside.demand.data());
+  for (auto* du : {&aside.beside, &aside.demand})
+    if (!du->empty()) parent_axes_.derivative_from_child(q, v, du->data());
+  return aside;
 }
 
 /// Of an accepted state.
@@ -160,23 +158,16 @@ void Simulation::coast_on(double t, const double* y) {
   to_state(q);
   impose(t, q);
   if (!aside_method_) aside_method_ = make_dynamics(setup_->driven(), setup_->options.dynamics);
-  std::vector<double> own(nv()), beside(nv());
-  const LoopReport report = accelerate_closed(aside_method_.get(), t, q, v, true, own.data());
-  if (report.strong == 0) return;
-  const bool known = accelerate_from_beside(aside_method_.get(), t, q, v,
-                                            Outcome::singular_position, beside.data());
-  for (auto* du : {&own, &beside}) parent_axes_.derivative_from_child(q, v, du->data());
-  coasting_.compare(t, {report, fastest_of(v, static_cast<int>(nv())), own},
-                    known ? &beside : nullptr);
+  coasting_.compare(t, demanded_aside(aside_method_.get(), t, q, v));
 }
 
 /// The same of du_ and y_, which hold a state's rates.
 Outcome Simulation::steer_sample(double t, Outcome outcome) {
   if (outcome == Outcome::converged && loop_report_.strong >= loops_->full_rank()) return outcome;
   const double *q = y_.data(), *v = rates_in(q);
-  const bool known = accelerate_from_beside(output_method_.get(), t, q, v, outcome, du_.data());
+  const Coasting::Aside aside = demanded_aside(output_method_.get(), t, q, v);
   parent_axes_.derivative_from_child(q, v, du_.data());
-  outcome = steer(t, outcome, du_.data(), false, known);
+  outcome = steer(t, outcome, aside, du_.data(), false);
   parent_axes_.derivative_to_child(q, v, du_.data());
   return outcome;
 }
