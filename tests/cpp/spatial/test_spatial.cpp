@@ -149,6 +149,17 @@ TEST(Spatial, EveryOperationEqualsDenseArithmetic) {
   }
 }
 
+TEST(Spatial, AScalarScalesEveryComponent) {
+  Draws draws(8);
+  const Operands<double> o = random_operands(draws);
+  const Array6 v = to_array(o.v), f = to_array(o.f);
+  const Array6 got_v = to_array(-2.5 * o.v), got_f = to_array(-2.5 * o.f);
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_EQ(got_v[i], -2.5 * v[i]);
+    EXPECT_EQ(got_f[i], -2.5 * f[i]);
+  }
+}
+
 TEST(Spatial, TransformsComeBackAndKeepPower) {
   Draws draws(8);
   for (int sample = 0; sample < 20; ++sample) {
