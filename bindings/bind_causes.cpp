@@ -40,11 +40,11 @@ void bind_causes(nb::module_& m) {
 
 Every state of a tree is eliminated once and solved for each cause [rodriguez1987].)",
           {R"(    causes: any of "gravity", "velocity", "drive" (tau, loop_tau), "motion" (prescribed), "passive" (the
-        model's damping, friction, springs and stops), "external".
+        model's damping, friction, springs and stops), "external", "misfit" (what bearings do not fit by).
 )",
            doc::q_v_tau, doc::external, doc::prescribed, doc::loop_tau,
            "    method: \"articulated_body\" or \"constraint_force\".\n"},
-          R"(    (..., causes, n_joints + n_loops, 6) [N, N m], as of joint_loads. All six causes add up to the
+          R"(    (..., causes, n_joints + n_loops, 6) [N, N m], as of joint_loads. All seven causes add up to the
     joint loads under all of these together. Loads that rigid bodies do not determine (see
     indeterminacy) are split by the rule that chooses them, the least energy, so they add up too.)",
           R"(a cause is unknown, shapes do not fit the model, or a number is not finite.

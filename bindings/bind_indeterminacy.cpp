@@ -52,6 +52,15 @@ void bind_indeterminacy(nb::module_& m) {
           "(n_joints + n_loops, 6) [bool]: those that are determinate because bearings decide "
           "them.")
       .def_prop_ro(
+          "couplings",
+          [](const Found& f) {
+            NewArray out({f.all.couplings.size()}, {});
+            std::copy(f.all.couplings.begin(), f.all.couplings.end(), out.data);
+            return read_only(out.array.attr("astype")("bool"));
+          },
+          nb::rv_policy::move,
+          "(couplings,) [bool]: whether the load of each coupling is determinate.")
+      .def_prop_ro(
           "self_stresses",
           [](const Found& f) { return stresses(f, f.all.n_self_stresses, f.all.self_stresses); },
           nb::rv_policy::move,

@@ -117,27 +117,9 @@ PyModel* with_joint(const PyModel& self, const std::string& joint, const nb::kwa
   return joints_on(self, one);
 }
 
-/// The same machine with a joint that yields to its load.
-PyModel* with_bearing(const PyModel& self, const std::string& joint, nb::handle radial,
-                      nb::handle axial, nb::handle tilt, nb::handle torsion, nb::handle axis) {
-  ModelSpec spec = self.model->spec();
-  const std::string head = "bearing of joint '" + joint + "': ";
-  BearingSpec bearing{joint};
-  const auto set = [&](nb::handle given, const char* name, double& to) {
-    if (!given.is_none()) to = real_number(given, (head + name).c_str());
-  };
-  set(radial, "radial", bearing.radial);
-  set(axial, "axial", bearing.axial);
-  set(tilt, "tilt", bearing.tilt);
-  set(torsion, "torsion", bearing.torsion);
-  if (!axis.is_none()) {
-    bearing.axis = vec3(axis, (head + "axis").c_str());
-    if (dot(bearing.axis, bearing.axis) == 0)
-      throw InputError(head + "axis has zero length; give a nonzero axis");
-  }
-  std::erase_if(spec.bearings, [&](const BearingSpec& had) { return had.joint == joint; });
-  spec.bearings.push_back(bearing);
-  return new PyModel(std::move(spec));
+PyModel* with_joint_type(const PyModel& self, const std::string& joint, const std::string& type) {
+  self.model->load_index(joint);  // names what is unknown or merged
+  return new PyModel(with_more_freedom(self.model->spec(), joint, joint_type_from_name(type)));
 }
 
 PyModel* prescribe(const PyModel& self, const std::vector<std::string>& names) {
@@ -468,6 +450,16 @@ Args:
 Raises:
     InputError: the joint or a property is unknown, the joint is merged or the floating base, or a
         number makes no sense.)")
+      .def("with_joint_type", &with_joint_type, "joint"_a, "type"_a, nb::rv_policy::take_ownership,
+           R"(The same machine with a hinge or a slider that leaves more freedom.
+
+Args:
+    joint: its name; it may close a loop.
+    type: "cylindrical", or of a hinge "spherical". Properties of its coordinate stay in a
+        cylindrical joint, whose other coordinate has none; a spherical one has none.
+
+Raises:
+    InputError: the joint is unknown or merged, or cannot become one of this type.)")
       .def("with_joints", &joints_on, "joints"_a, nb::rv_policy::take_ownership,
            R"(The same machine with other properties of several joints.
 
@@ -477,37 +469,6 @@ Args:
 
 Raises:
     InputError: as with_joint.)");
-}
-
-void bind_bearings(ModelClass& c) {
-  c.def("with_bearing", &with_bearing, "joint"_a, nb::kw_only(), "radial"_a = nb::none(),
-        "axial"_a = nb::none(), "tilt"_a = nb::none(), "torsion"_a = nb::none(),
-        "axis"_a = nb::none(), nb::rv_policy::take_ownership,
-        R"(The same machine with a joint that yields to its load, and so decides loads that rigid
-bodies leave open: of all that move the machine alike those of least elastic work.
-
-The limit of stiff bearings: it moves as before, and loads that rigid bodies determine stay. A joint
-without a bearing, and a direction without a stiffness, is rigid. Another bearing of a joint
-replaces the one it has.
-
-Args:
-    joint: its name; joints that close loops and rods as well.
-    radial, axial: stiffness across and along the axis [N/m]; of a rod axial alone.
-    tilt, torsion: stiffness against moments across and about the axis [N m/rad].
-    axis: (3,) in the frame in which the joint's load is given, of joints without an axis of their
-        own.
-
-Raises:
-    InputError: the joint is unknown, merged, a spring or floating, a stiffness is not above 0 or in
-        a direction in which the joint moves freely, or a joint without an axis is given none.)")
-      .def_prop_ro(
-          "bearing_joints",
-          [](const PyModel& s) {
-            nb::list out;
-            for (const BearingSpec& bearing : s.model->spec().bearings) out.append(bearing.joint);
-            return out;
-          },
-          "Names of the joints that yield to their loads, as with_bearing made them.");
 }
 
 void bind_storage(ModelClass& c) {

@@ -31,5 +31,7 @@ inline nb::tuple labels_of(const JointSpec& joint) {
 
 /// Joints that close loops; the rest of Model is in bind_model.
 void bind_loop_joints(ModelClass& c);
+/// What joints yield to their loads.
+void bind_bearings(ModelClass& c);
 
 }  // namespace linkwise::bindings

@@ -1,9 +1,11 @@
 """A door on two hinges: which of their loads a rigid body decides, and which it does not.
 
 Each hinge is a pin with some play against tilting, a ball joint. Both hold the door's weight, and
-how they share it depends on how they were fitted: no number is right, and the run says so. The
-number that a designer wants, the horizontal force on a hinge, is a couple's: weight times half the
-width over the distance of the hinges.
+how they share it depends on how they were fitted: no number is right, and the run says so (dashed
+and in brackets). The horizontal force on a hinge is a couple's: weight times half the width over
+the distance of the hinges. Say how stiff the hinges are, and how thick a shim is below one of them,
+and the vertical forces are decided as well: shares by stiffness, and what presses the hinges
+together.
 
 Run it by: python examples/19_door.py [PICTURE.svg]
 """
@@ -43,11 +45,32 @@ check(
 )
 check("push on the lower hinge", float(still.sel(joint="lower", component="fx")), couple, 1e-9, "N")
 check("both together, vertical", float(still.sel(component="fz").sum()), MASS * G, 1e-9, "N")
+
+LOWER, UPPER, SHIM = 3e6, 1e6, 100e-6  # N/m, N/m, m: sheet metal
+up = {"axis": (0, 0, 1)}
+hung = door.with_bearing("lower", axial=LOWER, **up).with_bearing("upper", axial=UPPER, **up)
+shimmed = hung.with_bearing("lower", axial=LOWER, offset=SHIM, **up)
+options = {"duration": 2.0, "every": 0.01, "v0": [0, 0, 3.0], "tolerance": 1e-9}
+with_bearings, with_shim = (lw.simulate(model, **options) for model in (hung, shimmed))
+for joint, stiffness, sign in (("lower", LOWER, 1), ("upper", UPPER, -1)):
+    at = {"joint": joint, "component": "fz", "time": 0}
+    share = MASS * G * stiffness / (LOWER + UPPER)
+    check(f"{joint}, by stiffness", float(with_bearings.joint_load.sel(at)), share, 1e-9, "N")
+    pressed = share + sign * SHIM / (1 / LOWER + 1 / UPPER)
+    check(f"{joint}, with the shim", float(with_shim.joint_load.sel(at)), pressed, 1e-9, "N")
+    decided = with_bearings.by_bearings.sel(joint=joint).values
+    check(f"{joint}: bearings decide fz alone", float(decided.sum() * decided[2]), 1, 0)
 if len(sys.argv) > 1:
     from picture import save
 
     sideways = np.sqrt((run.joint_load[..., :2] ** 2).sum("component"))
-    curves = {f"{joint}, horizontal": sideways.sel(joint=joint) for joint in ("lower", "upper")}
-    curves["both together, vertical"] = run.joint_load.sel(component="fz").sum("joint")
+    level = {joint: sideways.sel(joint=joint) for joint in ("lower", "upper")}
+    upright = {}
+    for joint in ("lower", "upper"):
+        at = {"joint": joint, "component": "fz"}
+        upright[f"({joint}, rigid)"] = run.joint_load.sel(at)
+        upright[f"{joint}, by stiffness"] = with_bearings.joint_load.sel(at)
+        upright[f"{joint}, shimmed"] = with_shim.joint_load.sel(at)
+    panels = [("horizontal force [N]", level), ("vertical force [N]", upright)]
     tips = {"lower": (WIDTH, 0, 0)}
-    save(sys.argv[1], run, [("force [N]", curves)], times=[0.0, 0.3, 2.0], tips=tips, view="xy")
+    save(sys.argv[1], run, panels, times=[0.0, 0.3, 2.0], tips=tips, view="xy")

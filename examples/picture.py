@@ -16,9 +16,9 @@ mpl.rcParams |= {"font.sans-serif": ["DejaVu Sans"], "font.size": 9, "path.simpl
 def save(path, run, panels, *, times, tips, view="xz", most=400):
     """Write an SVG file.
 
-    panels: (label of the axis, {name: values over the run's time}), one a panel. times: when the
-    machine is drawn. tips: {joint: point in its body's frame}, what is drawn beyond the last
-    joints. view: the world's axes that are drawn. most: points of a curve.
+    panels: (label of the axis, {name: values over the run's time}), one a panel; names in brackets
+    are dashed. times: when the machine is drawn. tips: {joint: point in its body's frame}, what is
+    drawn beyond the last joints. view: the world's axes that are drawn. most: points of a curve.
     """
     figure, axes = plt.subplots(
         1,
@@ -31,7 +31,9 @@ def save(path, run, panels, *, times, tips, view="xz", most=400):
     every = max(1, run.sizes["time"] // most)
     for axis, (label, curves) in zip(axes[1:], panels, strict=True):
         for name, values in curves.items():
-            axis.plot(run.time[::every], np.asarray(values)[::every], label=name, linewidth=1.2)
+            style = "--" if name.startswith("(") else "-"
+            shown = np.asarray(values)[::every]
+            axis.plot(run.time[::every], shown, style, label=name, linewidth=1.2)
         axis.set(xlabel="time [s]", ylabel=label, xlim=(run.time[0], run.time[-1]))
     if all(curves.keys() == panels[0][1].keys() for _, curves in panels):
         names, labels = axes[-1].get_legend_handles_labels()

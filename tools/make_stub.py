@@ -31,7 +31,7 @@ TARGETS: tuple[str, ...]
 ARRAYS = (
     "acceleration axes axis breakpoints child_point child_rotation child_translation com "
     "directions external f gravity guess inertia initial point "
-    "loop_tau origin prescribed q q0 rotation target tau times translation v v0 value values"
+    "loop_tau offset origin preload prescribed q q0 rotation target tau times translation turn v v0 value values"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "arg": "Any",  # without a name: what pickling has kept
@@ -71,6 +71,7 @@ RETURNS = {
     "DynamicsMethod.follow": "dict[str, Any]",
     "Frame.__getstate__": "tuple[str, Array, Array]",
     "Model.bearing_joints": "list[str]",
+    "Model.bearings": "dict[str, dict[str, Any]]",
     "Model.child_link_names": "list[str]",
     "Model.coupling_joints": "list[list[str]]",
     "Model.coupling_names": "list[str]",

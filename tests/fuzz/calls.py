@@ -78,6 +78,7 @@ CALLS = {
     "loop_gaps": "*q",
     "loop_coordinates": "*q v",
     "indeterminacy": "*q:state",
+    "undecided_loads": "q:state",
     "assemble": "q0:state v0:rates",
     "mass_matrix": "*q driven:joints threads",
     "driven_jacobian": "*q *driven:joints threads",
@@ -114,7 +115,9 @@ METHODS = {
     "child_point:vector",
     "with_spring": "*name:text *parent:link *child:link *length:number point:vector "
     "child_point:vector stiffness:number damping:number",
-    "with_bearing": "*joint radial:number axial:number tilt:number torsion:number axis:vector",
+    "with_bearing": "*joint radial:number axial:number tilt:number torsion:number axis:vector "
+    "offset:number turn:vector preload:vector",
+    "with_joint_type": "*joint *type:kind",
     "with_coupling": "*name:text *factors offset:number",
     "with_loop": "*name:text *type:kind *parent:link *child:link translation:vector rotation "
     "child_translation:vector child_rotation:rotation axis:vector pitch:number",

@@ -335,6 +335,69 @@ def test_links_that_cannot_meet_are_named():
         lw.simulate(model, duration=1)
 
 
+def told_numbers(model, q, before):
+    """What the message says behind some words, once that the model cannot be assembled."""
+    with pytest.raises(lw.InputError) as error:
+        lw.assemble(model, q)
+    text = str(error.value)
+    assert "which closes it" in text
+    assert "\n" not in text
+    numbers = text.partition(before)[2].strip("( ").replace(",", " ").replace(")", " ").split()
+    return [float(x) for x in numbers[:3] if x[-1].isdigit()]
+
+
+@pytest.mark.parametrize("length", [5.0, 0.5])
+def test_the_length_of_a_rod_that_would_reach_is_told(length):
+    """Cranks of 0.3 and 0.2 m, 2 m apart, reach 1.5 to 2.5 m."""
+
+    def cranks(length):
+        builder = lw.ModelBuilder("cranks")
+        builder.add_link("ground")
+        for name, at in (("left", 0.0), ("right", 2.0)):
+            rod(builder, name, 0.2)
+            builder.add_joint(f"pin_{name}", "revolute", "ground", name, translation=(at, 0, 0))
+        ends = {"point": (0.3, 0, 0), "child_point": (0.2, 0, 0)}
+        builder.add_rod("rod", "left", "right", length=length, **ends)
+        return builder.build()
+
+    (told, *_) = told_numbers(cranks(length), [0.1, 0.2], "give it the length")
+    assert told == pytest.approx(2.5 if length > 2 else 1.5, abs=3e-3)
+    assert lw.assemble(cranks(told), [0.1, 0.2]).released == ()
+
+
+def test_the_place_of_a_joint_that_would_meet_is_told():
+    def torn(point):
+        builder = lw.ModelBuilder("torn", gravity=(0, -9.81, 0))
+        builder.add_link("ground")
+        for name, at in (("left", 0.0), ("right", 4.0)):
+            rod(builder, name, 1.0)
+            builder.add_joint(f"pin_{name}", "revolute", "ground", name, translation=(at, 0, 0))
+        rod(builder, "bar", 1.0)
+        builder.add_joint("hook", "revolute", "left", "bar", translation=(1, 0, 0))
+        ends = {"translation": (1, 0, 0), "child_translation": point}
+        builder.add_loop("clasp", "revolute", "bar", "right", **ends)
+        return builder.build()
+
+    q = [0.3, 0.2, 0.1]
+    told = told_numbers(torn((1, 0, 0)), q, "place its point at")
+    assert np.hypot(*told[:2]) == pytest.approx(2, abs=2e-2)  # 4 m less two bars
+    assert lw.assemble(torn(told), q).released == ()
+
+
+def test_the_offset_that_a_coupling_could_keep_is_told():
+    builder = lw.ModelBuilder("cam")
+    builder.add_link("frame")
+    rod(builder, "shaft", 0.1)
+    builder.add_joint("turn", "revolute", "frame", "shaft")
+    model = builder.build()
+    cam = {"turn": [0.0, 1.0]}  # the square is -0.5 nowhere
+    (told,) = told_numbers(
+        model.with_coupling("cam", cam, offset=-0.5), [0.3], "give it the offset"
+    )
+    assert told == pytest.approx(0, abs=1e-2)
+    assert lw.assemble(model.with_coupling("cam", cam, offset=told), [0.3]).released == ()
+
+
 def test_motions_that_contradict_each_other_are_refused():
     model = benchmark("four_bars", n=1).model
     q, v = state(model, A=0.1, B=-0.1), state(model, A0=1, A1=2)

@@ -51,6 +51,8 @@ def inspect(
         screen.print(properties)
     if found["loops"]:
         screen.print(_loop_table(found["loops"], most))
+    if found["undecided"]:
+        screen.print(_undecided_table(found["undecided"]))
     notes = found["notes"]
     if notes:
         screen.print(_note_table(notes, len(notes) if every_row else _MOST_ROWS))
@@ -124,24 +126,44 @@ def _loops(model: Model) -> list[dict[str, Any]]:
     ]
 
 
-def _mobility(model: Model) -> dict[str, int | None]:
+def _mobility(model: Model) -> dict[str, Any]:
     """Degrees of freedom by counting, as if nothing held the same twice, and in the pose that is
-    drawn, with how many loads are held more than once there; None where it does not close."""
+    drawn, with how many loads are held more than once there, and which of them nothing decides;
+    None where it does not close."""
     from linkwise._core import InputError, indeterminacy
+    from linkwise.loads.undecided import misfit_notes, undecided_loads
 
     rows = sum(6 - freedom for freedom in model.loop_nv) + len(model.coupling_names)
-    found: dict[str, int | None] = {
+    found: dict[str, Any] = {
         "counted_mobility": model.nv - rows,
         "mobility": None,
         "self_stresses": None,
+        "undecided": [],
     }
     if not rows or rows > _MOST_LOOP_ROWS:
         return found
     try:
-        held = indeterminacy(model, model.initial_configuration())
+        q = model.initial_configuration()
+        held = indeterminacy(model, q)
+        undecided = undecided_loads(model, q)
+        misfits = misfit_notes(model, q)
     except InputError:
         return found
-    return found | {"mobility": held.mobility, "self_stresses": held.rows - held.rank}
+    told = [
+        {
+            "self_stresses": one.self_stresses,
+            "joints": one.joints,
+            "couplings": one.couplings,
+            "remedies": one.remedies,
+        }
+        for one in undecided
+    ]
+    return found | {
+        "mobility": held.mobility,
+        "self_stresses": held.rows - held.rank,
+        "undecided": told,
+        "misfits": [{"joint": joint, "text": said} for joint, said in misfits],
+    }
 
 
 def _plural(count: int, noun: str, nouns: str = "") -> str:
@@ -261,6 +283,16 @@ def _property_table(joints: Sequence[dict[str, Any]], most: int) -> Any:
                 shown = values[:1] if len(set(values)) == 1 else values
                 cells.append(", ".join(map(number, shown)))
         made.add_row(text(joint["joint"]), *cells)
+    return made
+
+
+def _undecided_table(undecided: Sequence[dict[str, Any]]) -> Any:
+    """What no rigid body decides, and what was tried and does."""
+    from linkwise.loads.undecided import Undecided
+
+    made = table("Loads that rigid bodies and bearings do not decide, as drawn", [("", "left")])
+    for one in undecided:
+        made.add_row(text(Undecided(**one).text))
     return made
 
 

@@ -50,6 +50,7 @@ CAUSES: dict[str, dict[str, str]] = {
         "motion": "the accelerations of the joints whose motion is given, alone",
         "passive": "damping, friction, springs and stops of the joints alone",
         "external": "the external wrenches alone",
+        "misfit": "what bearings do not fit by, and preloads, alone",
     },
     "motion": {
         "gravity": "what holds the mechanism at rest against gravity",
@@ -62,6 +63,7 @@ CAUSES: dict[str, dict[str, str]] = {
 
 #: Part of the largest share that the sum may miss in machines with loops.
 _LOST = 1e-6
+_MISFITS = {"offset", "turn", "preload"}
 _PASSIVE = ("damping", "friction", "stiffness", "limit_stiffness")
 
 
@@ -108,9 +110,12 @@ class Split:
             return kinds is None or not set(kinds.values()) <= {"free", "locked", "motion"}
         if cause == "passive":
             free = ~self.imposed
-            if any(self.model.loop_nv):
+            if any(self.model.loop_property(name).any() for name in _PASSIVE):
                 return True
             return any(self.model.dof_property(name)[free].any() for name in _PASSIVE)
+        if cause == "misfit":
+            given = self.model.bearings.values() if self.closed else ()
+            return any(_MISFITS & bearing.keys() for bearing in given)
         if cause == "external":
             return "external_wrench" in self.run.dataset
         return "motion" in self.given.values()

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from linkwise._core import InputError
 from linkwise.base import HALVES, Array, lengths
 from linkwise.loads.causes import Split, along_total
+from linkwise.loads.determinate import components_of
 from linkwise.loads.energy import energy_balance
 from linkwise.loads.engineering import derive, joint_directions
 from linkwise.loads.extremes import component_extremes, loads_at_peaks
@@ -28,7 +29,9 @@ if TYPE_CHECKING:
     from linkwise.loads.samples import RunLike
 
 Figure = dict[str, Any]
-_COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
+_COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
+_OPEN = {"dash": "dot"}
+_NOT_KNOWN = "; dotted and in brackets: one choice of many"
 TIMES = "times"
 """Stands for the times of the samples drawn, which the page holds once."""
 
@@ -74,15 +77,22 @@ def _histories(load: Array, run: RunLike, joint: int) -> list[Figure]:
     made = []
     extremes = component_extremes(run, joint)
     peak_times, peaks = loads_at_peaks(run, joint)
+    known = components_of(run)
+    open_ones = np.zeros(6, dtype=np.bool_) if known is None else ~known[joint]
     for k, (half, unit, components) in enumerate(HALVES):
         part = load[:, 3 * k : 3 * k + 3]
         data = []
         for c, (name, color) in enumerate(zip(components, _COLOURS, strict=False)):
-            data.append(_line(name, TIMES, part[:, c], line={"color": color}))
+            line = {"color": color} | (_OPEN if open_ones[3 * k + c] else {})
+            label = f"({name})" if open_ones[3 * k + c] else name
+            data.append(_line(label, TIMES, part[:, c], line=line))
             data.append(_dots(color, *extremes[name]))
-        data.append(_line("size", TIMES, lengths(part), line={"color": "black"}))
+        some = bool(open_ones[3 * k : 3 * k + 3].any())
+        line = {"color": "black"} | (_OPEN if some else {})
+        data.append(_line("(size)" if some else "size", TIMES, lengths(part), line=line))
         data.append(_dots("black", peak_times, lengths(peaks[:, 3 * k : 3 * k + 3])))
-        layout = _layout(half.capitalize(), "time [s]", f"{half} [{unit}]")
+        title = half.capitalize() + (_NOT_KNOWN if some else "")
+        layout = _layout(title, "time [s]", f"{half} [{unit}]")
         made.append({"data": data, "layout": layout})
     return made
 

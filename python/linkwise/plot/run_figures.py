@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise._core import InputError
-from linkwise.base import HALVES
+from linkwise.base import COMPONENTS, HALVES
 from linkwise.loads.causes import along_total, split
+from linkwise.loads.determinate import components_of
 from linkwise.loads.energy import energy_balance
 from linkwise.loads.extremes import component_extremes, missed_peaks
 from linkwise.loads.samples import joint_position
@@ -40,17 +41,24 @@ class RunPlots:
     def loads(self, joint: str) -> Any:
         """Force and moment of a joint over time, by component, at the joint point in its frame.
 
-        Lines join the samples; dots are each component's extremes between them.
+        Lines join the samples; dots are each component's extremes between them. Components that
+        rigid bodies do not determine are dashed, with their names in brackets.
         """
         where = joint_position(self._run, joint)
         load = self._run.dataset["joint_load"].isel(joint=where)
         figure, axes = _figure(2)
         times = self._run.dataset["time"].values
         extremes = component_extremes(self._run, where)
+        known = components_of(self._run)
         for axis, (half, unit, components) in zip(axes, HALVES, strict=True):
             for name in components:
+                is_open = known is not None and not known[where, COMPONENTS.index(name)]
                 (line,) = axis.plot(
-                    times, load.sel(component=name).values, label=name, linewidth=1.2
+                    times,
+                    load.sel(component=name).values,
+                    label=f"({name})" if is_open else name,
+                    linewidth=1.2,
+                    linestyle="--" if is_open else "-",
                 )
                 axis.plot(*extremes[name], "o", color=line.get_color(), markersize=4)
             axis.set_ylabel(f"{half} [{unit}]")

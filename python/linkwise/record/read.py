@@ -19,7 +19,7 @@ from linkwise.record.extremes import PREFIX
 from linkwise.record.labels import text_array
 from linkwise.record.model import GROUP
 from linkwise.record.provenance import FORMAT_KEY
-from linkwise.record.schema import DETERMINATE, ORDER
+from linkwise.record.schema import BY_BEARINGS, DETERMINATE, ORDER
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,7 +119,7 @@ def open_dataset(path: Path, *, finished: bool) -> xr.Dataset:
         try:
             array = open_array(store, name)
         except InputError as error:
-            if name not in (*ORDER, DETERMINATE) and not name.startswith(PREFIX):
+            if name not in (*ORDER, DETERMINATE, BY_BEARINGS) and not name.startswith(PREFIX):
                 raise
             _left_out(error, name)
             continue

@@ -51,12 +51,12 @@ class Schema:
     coordinates: Mapping[str, Coordinate]
     quantities: tuple[str, ...]
     extremes: ExtremesLayout | None = None
-    determinate: Variable | None = None
+    marks: tuple[Variable, ...] = ()
 
     @property
     def timeless(self) -> tuple[Variable, ...]:
         extremes = self.extremes.variables if self.extremes else ()
-        return extremes if self.determinate is None else (*extremes, self.determinate)
+        return (*extremes, *self.marks)
 
     @property
     def extremes_bytes(self) -> int:
@@ -69,8 +69,8 @@ class Schema:
 
 # The order in which a dataset lists its variables; extremes follow.
 ORDER = tuple(row["name"] for row in TABLE)
-#: Of runs of machines with loops: (joint, component).
-DETERMINATE = "determinate"
+#: Of runs of machines with loops: (joint, component); the second one where there are bearings.
+DETERMINATE, BY_BEARINGS = "determinate", "by_bearings"
 TIME_ATTRS = {"long_name": "time", "units": "s"}
 
 
@@ -238,17 +238,29 @@ def _body_variables(
     return [_wrench_variable(row, "wrenched_body", bodies, False) for row in rows]
 
 
-def _determinate(variables: Sequence[Variable]) -> Variable | None:
-    """Of every component of the loads that are recorded, whether rigid bodies determine it."""
-    for load in variables:
-        if load.name == "joint_load":
-            attrs = {
-                "long_name": "whether rigid bodies determine the component of the joint load",
-                "convention": "true: in every pose of the run that was looked at; false: the value "
-                "in joint_load is one choice of many",
-            }
-            return replace(load, name=DETERMINATE, dtype=np.dtype(np.bool_), attrs=attrs)
-    return None
+_MARKS = {
+    DETERMINATE: {
+        "long_name": "whether rigid bodies determine the component of the joint load",
+        "convention": "true: in every pose of the run that was looked at; false: the value "
+        "in joint_load is one choice of many",
+    },
+    BY_BEARINGS: {
+        "long_name": "whether the stiffness of bearings decides the component of the joint load",
+        "convention": "true: determinate, in some pose of the run that was looked at by bearings "
+        "alone; false: by rigid bodies, or not at all",
+    },
+}
+
+
+def _marks(model: Model, variables: Sequence[Variable]) -> tuple[Variable, ...]:
+    """Of every component of the loads that are recorded, what determines it."""
+    names = _MARKS if model.bearing_joints else (DETERMINATE,)
+    return tuple(
+        replace(load, name=name, dtype=np.dtype(np.bool_), attrs=_MARKS[name])
+        for load in variables
+        if load.name == "joint_load"
+        for name in names
+    )
 
 
 def build_schema(
@@ -264,7 +276,7 @@ def build_schema(
 
     `wrenched` names the bodies with an external wrench, which is recorded for them alone;
     `extremes` keeps those of loads between the samples, where loads are recorded;
-    `determinate` says which of their components rigid bodies determine.
+    `determinate` says which of their components rigid bodies determine, and which bearings.
     """
     kept = resolve_quantities(quantities)
     rows = [row for row in TABLE if row["group"] in kept]
@@ -291,8 +303,8 @@ def build_schema(
         for row in rows
         if row["axis"] == "none"
     ]
-    known = _determinate(variables) if determinate else None
-    schema = Schema(tuple(variables), coordinates, kept, determinate=known)
+    marks = _marks(model, variables) if determinate else ()
+    schema = Schema(tuple(variables), coordinates, kept, marks=marks)
     layout = extremes_layout(model, schema.variables) if extremes else None
     if layout is None:
         return schema

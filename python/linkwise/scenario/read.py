@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
+import numpy.typing as npt
 from pydantic import ValidationError
 
 from linkwise import scenes
@@ -112,6 +114,11 @@ class Scenario(ScenarioSource):
             },
             "output": self._output_path(),
         }
+
+    def first_position(self, model: Model) -> tuple[npt.NDArray[np.float64] | None, list[str]]:
+        """Where the scenario starts (nq,) [rad, m], loops perhaps open, None where it does not say;
+        and the joints that it places. InputError as `simulate_arguments`."""
+        return ArgumentBuilder(self, model).state("position"), list(self.settings.initial.position)
 
     def replaces_elsewhere(self) -> Path | None:
         """What [output] path would replace outside the folder of this file, or None.

@@ -87,6 +87,22 @@ def _factors(value: Any) -> float | list[float]:
     return numbers if isinstance(value, list) else numbers[0]
 
 
+def _along_or_all(dimension: str) -> PlainValidator:
+    """One number, along an axis, or three."""
+
+    def convert(value: Any) -> float | list[float]:
+        if isinstance(value, list) and len(value) != 3:
+            raise ValueError(f"has {len(value)} numbers; give one along the axis, or three")
+        numbers = []
+        for one in value if isinstance(value, list) else [value]:
+            quantity = _quantity(one)
+            check_dimension(quantity.dimension, dimension)
+            numbers.append(quantity.value)
+        return numbers if isinstance(value, list) else numbers[0]
+
+    return PlainValidator(convert)
+
+
 Scalar = Annotated[Quantity, PlainValidator(_quantity)]
 Vector = Annotated[Quantity | list[Quantity], PlainValidator(_quantities)]
 Limit = Annotated[Quantity | list[Quantity], PlainValidator(_limits)]
@@ -357,14 +373,21 @@ class RodSection(Section):
     child_point: Point | None = None
 
 
+Turn = Annotated[list[Annotated[float, _of("angle")]], Field(min_length=3, max_length=3)]
+
+
 class BearingSection(Section):
-    """How stiff a joint is against the loads that it holds; rigid where nothing is given."""
+    """How stiff a joint is against the loads that it holds, rigid where nothing is given, and what
+    it does not fit by."""
 
     radial: Annotated[float, _of("stiffness"), Field(gt=0)] | None = None
     axial: Annotated[float, _of("stiffness"), Field(gt=0)] | None = None
     tilt: Annotated[float, _of("angular stiffness"), Field(gt=0)] | None = None
     torsion: Annotated[float, _of("angular stiffness"), Field(gt=0)] | None = None
     axis: Direction | None = None
+    offset: Annotated[float | list[float], _along_or_all("length")] | None = None
+    turn: Turn | None = None
+    preload: Annotated[float | list[float], _along_or_all("force")] | None = None
 
 
 class PointSpringSection(Section):

@@ -152,7 +152,7 @@ def _schema(models: Sequence[Model], record: Collection[str] | None, extremes: b
 
 def _asked(schema: Schema) -> tuple[str, ...]:
     """What the core is to return: positions even where they are not recorded, to look at them."""
-    positions = () if schema.determinate is None else ("position",)
+    positions = ("position",) if schema.marks else ()
     return tuple(dict.fromkeys((*schema.quantities, *positions)))
 
 
@@ -165,19 +165,21 @@ def _add_determinate(
 ) -> list[Ignored]:
     """Add which loads of each member rigid bodies determine; what is said of those that they do
     not. columns: positions (members, time, nq), and the states at peaks where they are kept."""
-    if schema.determinate is None:
+    if not schema.marks:
         return []
-    known: list[AnyArray] = []
+    known: dict[str, list[AnyArray]] = {mark.name: [] for mark in schema.marks}
     said: dict[Ignored, list[int]] = {}
     positions, states = columns["position"], columns.get("extreme_state")
     each = len(positions) // len(models)
     for member, path in enumerate(positions):
         model = models[member // each]
         start = _core.assemble(model, rows["q0"][member], rows["v0"][member], [])["q"]
-        seen = Determinacy(model, drives, start, len(path))
+        seen = Determinacy(model, drives, start, len(path), explain=False)
         seen.see(path)
         seen.see_peaks(None if states is None else states[member])
-        known.append(seen.throughout)
+        marks = seen.marks()
+        for name, of_members in known.items():
+            of_members.append(marks[name])
         for note in seen.notes():
             said.setdefault(note, []).append(member)
     notes = []
@@ -185,7 +187,7 @@ def _add_determinate(
         whose = "" if len(members) == len(positions) else f"member {members[0]}: "
         more = f"; the same of {len(members) - 1} more members" if whose and members[1:] else ""
         notes.append(note._replace(text=f"{whose}{note.text}{more}"))
-    columns[schema.determinate.name] = np.array(known)
+    columns.update({name: np.array(of_members) for name, of_members in known.items()})
     return notes
 
 

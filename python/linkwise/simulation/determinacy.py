@@ -9,16 +9,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwise._core import InputError
-from linkwise.base import COMPONENTS, AnyArray
+from linkwise.base import COMPONENTS, DERIVED, AnyArray
 from linkwise.drives import Locked, Motion
 from linkwise.loads.determinate import FEW_ROWS, MOST_ROWS, PEAKS, POSES, Held, loop_rows
+from linkwise.loads.undecided import Undecided, describe, misfit_notes
 from linkwise.notes import Ignored
+from linkwise.record.extremes import ROWS
+from linkwise.record.schema import BY_BEARINGS, DETERMINATE
 
 if TYPE_CHECKING:
     from linkwise._core import Model
     from linkwise.drives import Drive
 
 _MOST_NAMED = 8
+_LIFTED = (
+    "the force along its axis turns against its preload in this run: a bearing that carries one "
+    "way alone would let go there, and here it pulls; give more preload, or bearings that carry "
+    "both ways"
+)
+_REMEDY = (
+    ", but say how stiff its bearings are ([bearing.JOINT], with_bearing), or leave a joint of the "
+    "loop more freedom (a spherical or cylindrical one)"
+)
 _ELEMENT = "joint_load"
 
 
@@ -34,10 +46,17 @@ class Determinacy:
         model: the machine; one that `is_looked_at`; drives: by joint.
         q: (nq,) [rad, m]: the start, which closes all loops.
         samples: how many positions `see` will be given.
+        explain: whether `notes` says what holds each other, and what would decide it.
     """
 
     def __init__(
-        self, model: Model, drives: Mapping[str, Drive], q: AnyArray, samples: int
+        self,
+        model: Model,
+        drives: Mapping[str, Drive],
+        q: AnyArray,
+        samples: int,
+        *,
+        explain: bool = True,
     ) -> None:
         self._model = model
         given = [name for name, drive in drives.items() if isinstance(drive, Locked | Motion)]
@@ -50,13 +69,29 @@ class Determinacy:
         self._open = np.zeros((model.n_joints + model.n_loops, len(COMPONENTS)), dtype=np.int64)
         self._count = 0
         self._self_stresses = 0
+        self._by_bearings = np.zeros(self._open.shape, dtype=np.bool_)
+        self._couplings: set[str] = set()
+        self._told: list[Undecided] = []
+        self._misfits: list[tuple[str, str]] = []
         self._classify(q)
+        if self._count and explain:
+            self._told = describe(model, q, given) if self._self_stresses else []
+            self._misfits = misfit_notes(model, q)
 
     @property
     def throughout(self) -> AnyArray:
         """(n_joints + n_loops, 6) [bool]: determinate in every pose that was looked at."""
         found: AnyArray = self._open == 0
         return found
+
+    def marks(self) -> dict[str, AnyArray]:
+        """By variable of the run (n_joints + n_loops, 6) [bool]."""
+        return {DETERMINATE: self.throughout, BY_BEARINGS: self.by_bearings}
+
+    @property
+    def by_bearings(self) -> AnyArray:
+        """(n_joints + n_loops, 6) [bool]: determinate in all poses, in some by bearings alone."""
+        return self._by_bearings & self.throughout
 
     def _classify(self, q: AnyArray) -> None:
         if not np.isfinite(q).all():
@@ -66,6 +101,9 @@ class Determinacy:
         except InputError:  # of a run that went astray: its loops are open
             return
         self._count += 1
+        self._by_bearings |= np.asarray(found.by_bearings)
+        names = zip(self._model.coupling_names, found.couplings, strict=True)
+        self._couplings |= {name for name, known in names if not known}
         self._open += np.logical_not(found.determinate)
         self._self_stresses = max(self._self_stresses, len(found.undecided))
 
@@ -85,6 +123,24 @@ class Determinacy:
         for k in {round(k) for k in np.linspace(0, len(different) - 1, self._peaks)}:
             self._classify(different[k])
 
+    def see_extremes(self, extremes: AnyArray | None) -> None:
+        """The extremes of quantities (row, quantity, joint) of all joints: where the force along
+        the axis of a preloaded bearing turned round."""
+        if extremes is None or extremes.shape[-1] != len(self._open):
+            return
+        names = [*self._model.joint_names, *self._model.loop_names]
+        axes = [*self._model.joint_axes, *self._model.loop_axes]
+        axial = extremes[:, DERIVED.index("axial")]
+        low, high = (axial[ROWS.index(row)] for row in ("minimum", "maximum"))
+        for name, bearing in self._model.bearings.items():
+            j = names.index(name)
+            preload = np.asarray(bearing.get("preload", 0.0), dtype=float)
+            if not axes[j]:
+                continue
+            along = float(preload) if preload.ndim == 0 else float(preload @ axes[j][0][1])
+            if (along > 0 and low[j] < 0) or (along < 0 and high[j] > 0):
+                self._misfits.append((name, _LIFTED))
+
     def notes(self) -> list[Ignored]:
         """What the reader of the run is told: nothing where all loads are determinate."""
         always = self._open == self._count
@@ -95,17 +151,23 @@ class Determinacy:
             parts.append(f"the loads of joints {_listed(names, always)}")
         if sometimes.any():
             parts.append(f"in some poses only those of joints {_listed(names, sometimes)}")
+        if self._couplings:
+            parts.append(f"what couplings {_and(sorted(map(repr, self._couplings)))} carry")
+        notes = [Ignored("", name, text) for name, text in self._misfits]
         if not parts or not self._count:
-            return []
+            return notes
         count = self._self_stresses
+        told = [one for one in self._told if one.remedies or one.couplings]
+        remedy = "" if told else _REMEDY
         text = (
             f"rigid bodies do not determine {', and '.join(parts)}: {count} "
             f"self-stress{'es' if count > 1 else ''} of the closed loops load "
             "them by any amount, and what is shown is one choice of many; do not size parts by "
-            "it, but say how stiff its bearings are ([bearing.JOINT], with_bearing), or leave "
-            "a joint of the loop more freedom (a spherical or cylindrical one)"
+            f"it{remedy}"
         )
-        return [Ignored("", _ELEMENT, text)]
+        notes.append(Ignored("", _ELEMENT, text))
+        notes += [Ignored("", _ELEMENT, one.text) for one in told]
+        return notes
 
 
 def _listed(names: list[str], mask: AnyArray) -> str:
@@ -116,6 +178,10 @@ def _listed(names: list[str], mask: AnyArray) -> str:
     ]
     more = f" and {len(said) - _MOST_NAMED} more" if len(said) > _MOST_NAMED else ""
     return ", ".join(said[:_MOST_NAMED]) + more
+
+
+def _and(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def not_looked_at(models: Iterable[Model]) -> list[Ignored]:

@@ -206,11 +206,14 @@ def _timeless(
         found = schema.extremes.empty()
         with contextlib.suppress(Exception):
             found = schema.extremes.split(simulation.extremes())
-    if determinacy is not None and schema.determinate is not None:
+    if determinacy is not None:
         if ended:
             determinacy.see_peaks(found.get("extreme_state"))
-        known, take = determinacy.throughout, schema.determinate.take
-        found[schema.determinate.name] = known if take is None else known[take]
+            determinacy.see_extremes(found.get("extreme_quantity"))
+        marks = determinacy.marks()
+        for mark in schema.marks:
+            known = marks[mark.name]
+            found[mark.name] = known if mark.take is None else known[mark.take]
     return found
 
 
@@ -483,7 +486,7 @@ def simulate(
     attrs |= _chosen(simulation, by_joint, by_name)
     notes += _of_loops(simulation, model, schema)
     looked = model, by_joint, simulation.start_position, sampled.size
-    determinacy = Determinacy(*looked) if schema.determinate else None
+    determinacy = Determinacy(*looked) if schema.marks else None
     ignored = [*notes, *_coarse_solver(simulation, options), *warnings_of(model)]
     attrs |= warning_attrs([*ignored, *_open(determinacy)])
     if output is None:

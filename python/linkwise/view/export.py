@@ -160,8 +160,8 @@ def _poses(model: Model, places: Places, q: Array, link_poses: npt.NDArray[np.in
 
 
 def _still(source: Source) -> Animation:
-    model, places, pose = source.model, Places(source.model), Pose(source.model)
-    q = pose.assembled(model.initial_configuration(), None)
+    model, places, pose = source.model, Places(source.model), Pose(source.model, source.held)
+    q = pose.assembled(source.first_position, None)
     where = _link_poses(model, places, q)
     poses, loads = _poses(model, places, q, where)[None], pose.loads(q)[None, None]
     return Animation(np.zeros(1), poses.astype(np.float32), where, loads.astype(np.float32), [])
@@ -207,6 +207,9 @@ def _content(source: Source, scene: Scene, animation: Animation) -> dict[str, An
     if use is not None:
         rating = {"directions": np.nan_to_num(use.directions, nan=np.inf), "limits": use.limits}
     chosen = animation.causes
+    known = source.determinate
+    if known is not None:
+        known = np.all(known.reshape(-1, 2, 3), axis=2)
     if recording is not None and recording.causes is not None:
         chosen = sorted(recording.causes.chosen)
     return {
@@ -224,6 +227,7 @@ def _content(source: Source, scene: Scene, animation: Animation) -> dict[str, An
         "legends": [legend(largest, by_rating) for by_rating in (False, True)],
         "colors": arrows.color_table(),
         "film": recording is not None,
+        "known": None if known is None else known.reshape(-1).tolist(),
     }
 
 

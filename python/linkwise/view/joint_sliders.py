@@ -25,14 +25,19 @@ class JointSliders:
     """One slider per coordinate, between its limits; of long models those of the first joints.
 
     The four coordinates of a quaternion are set by three angles, about x, then y, then z.
-    moved: the joint that a person moved last, None before that.
+    start: (nq,) [rad, m]; moved: the joint that a person moved last, None before that.
     """
 
     def __init__(
-        self, server: viser.ViserServer, model: Model, size: float, requests: Requests
+        self,
+        server: viser.ViserServer,
+        model: Model,
+        size: float,
+        requests: Requests,
+        start: Array,
     ) -> None:
         self._model = model
-        self.q = model.initial_configuration()
+        self.q = start.copy()
         self._sliders: list[Any] = []
         self._reads: list[Callable[[], float]] = []
         self.moved: str | None = None

@@ -69,10 +69,14 @@ class View:
             self._playback = Playback(float(recording.times[0]), float(recording.times[-1]))
             self._controls = PlaybackControls(server, self._playback, self._requests)
         self._sliders: JointSliders | None = None
-        self._pose = Pose(source.model)
+        self._pose = Pose(source.model, source.held)
         if recording is None and posable:
             self._sliders = JointSliders(
-                server, source.model, 0.5 * self.scene.size, self._requests
+                server,
+                source.model,
+                0.5 * self.scene.size,
+                self._requests,
+                source.first_position,
             )
         if recording is None or recording.has_loads:
             self._add_loads(server, recording, by_rating)
@@ -136,9 +140,8 @@ class View:
         return changed
 
     def _draw_pose(self) -> None:
-        model = self._source.model
         if self._sliders is None:
-            q = self._pose.assembled(model.initial_configuration(), None)
+            q = self._pose.assembled(self._source.first_position, None)
         else:
             q = self._pose.assembled(self._sliders.q.copy(), self._sliders.moved)
             self._sliders.follow(q)
@@ -176,9 +179,12 @@ class View:
 
     def _tell(self, head: str, load: np.ndarray, tail: str = "") -> None:
         if self._choice is not None:
-            force, moment = lengths(load.reshape(2, 3))
+            sizes = [f"{size:.4g}" for size in lengths(load.reshape(2, 3))]
+            if self._source.determinate is not None:
+                known = self._source.determinate[self._joint].reshape(2, 3).all(axis=1)
+                sizes = [x if one else f"({x})" for x, one in zip(sizes, known, strict=True)]
             tail = f"; {tail}" if tail else ""
-            self._choice.tell(f"{head}{force:.4g} N, {moment:.4g} N m{tail}")
+            self._choice.tell(f"{head}{sizes[0]} N, {sizes[1]} N m{tail}")
 
 
 def show(

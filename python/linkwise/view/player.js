@@ -353,7 +353,11 @@
       if (!load) return;
       const head = this.data.film ? `t = ${general(this.data.times[frame])} s: ` : "held still: ";
       const [force, moment] = [0, 3].map(i => Math.hypot(load[i], load[i + 1], load[i + 2]));
-      this.tell(`${head}${general(force)} N, ${general(moment)} N m`);
+      const bracketed = (size, half) => {
+        const {known} = this.data, shown = general(size);
+        return !known || known[2 * this.joint + half] ? shown : `(${shown})`;
+      };
+      this.tell(`${head}${bracketed(force, 0)} N, ${bracketed(moment, 1)} N m`);
     }
 
     plot() {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 _SHOWN = 4  # names in a line
 _MOST = 200  # degrees of freedom: of more, what holds a machine would take long to find
+_WHERE = "where loops close"
 _CLOSED = 1e-9  # m or rad, that assembly moves what is closed by rounding
 
 
@@ -23,11 +25,13 @@ class Pose:
     """Poses of a model. With loops, some joints are enough to hold the machine: `holders`, the
     first ones from the base that have one axis, or None where none can be found.
 
-    told: what is said of the last pose.
+    told: what is said of the last pose; held: joints that stay where the first pose has them, as
+    long as loops close so.
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, held: Sequence[str] = ()) -> None:
         self._model = model
+        self._held = list(held)
         self.looped = bool(model.n_loops or model.coupling_names)
         self.told, self._open = "", False
         self.holders: list[str] | None = []
@@ -40,12 +44,13 @@ class Pose:
             return q
         try:
             rest = np.zeros(self._model.nv)
-            found = _core.assemble(self._model, q, rest, [moved] if moved else [])
+            found = _core.assemble(self._model, q, rest, [moved] if moved else self._held)
         except InputError as error:
             self._open, self.told = True, f"loops stay open here: {shorten(error, 160)}"
             return q
         if found["released"]:
-            self.told = f"{moved} cannot be there: it moved back to where loops close"
+            what = f"it moved back to {_WHERE}" if moved else f"moved to {_WHERE}"
+            self.told = f"{_listed(found['released'])} cannot be there: {what}"
         elif moved is None:
             self.told = self._what_moved(q, found["q"])
         return np.asarray(found["q"])

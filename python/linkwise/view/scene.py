@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise import _core
-from linkwise.base import Array
+from linkwise.base import AnyArray, Array
 from linkwise.io.complaint import shorten
 from linkwise.io.urdf_visuals import Visual
 from linkwise.view.meshes import load_mesh
@@ -28,6 +28,8 @@ from linkwise.view.placement import (
 from linkwise.view.places import Places
 from linkwise.view.shapes import (
     Mesh,
+    dashed_arc,
+    dashed_arrow,
     equivalent_boxes,
     turned,
     unit_arc,
@@ -78,7 +80,10 @@ class Scene:
         self._few = model.n_joints <= _MANY
         self.layers: dict[str, list[Layer]] = defaultdict(list)
         self.joint_marks: Any = None
-        start = model.initial_configuration()
+        self._open: AnyArray = np.zeros(
+            (len(self.places.names), 2), dtype=np.bool_
+        )  # force, moment
+        start = source.first_position
         if source.recording is not None:
             start = source.recording.position(0)
         self._snapshot = self.at(start, None)
@@ -97,7 +102,7 @@ class Scene:
             peaks = np.zeros(len(self.places.names))
             if source.recording is not None:
                 peaks = source.recording.peaks
-            self._add_loads(shown=shown, peaks=peaks)
+            self._add_loads(shown=shown, peaks=peaks, known=source.determinate)
         self._frame_camera(server)
         for name, shown in self.toggles.items():
             self.toggle(name, shown)
@@ -283,10 +288,13 @@ class Scene:
 
     # -- loads ------------------------------------------------------------------------------
 
-    def _add_loads(self, *, shown: bool, peaks: Array) -> None:
-        """Arrows and arcs; of large machines at joints here and there and at the most loaded one,
-        and, unless switched on, hidden ones at every joint.
+    def _add_loads(self, *, shown: bool, peaks: Array, known: AnyArray | None) -> None:
+        """Arrows and arcs, dashed ones where rigid bodies do not determine the load; of large
+        machines at joints here and there and at the most loaded one, and, unless switched on,
+        hidden ones at every joint.
         """
+        if known is not None:
+            self._open = np.any(~known.reshape(-1, 2, 3), axis=2)
         every = np.arange(len(self.places.names))
         arrow, arc = unit_arrow(10), unit_arc(6, 28)
         if not self._few:
@@ -301,16 +309,21 @@ class Scene:
     def _add_load_layers(
         self, forces: str, moments: str, meshes: tuple[Mesh, Mesh], joints: Any, shown: bool
     ) -> None:
+        dashed = (dashed_arrow(), dashed_arc())
         for half, (toggle, mesh) in enumerate(zip((forces, moments), meshes, strict=True)):
-            handle = self._add(
-                toggle,
-                shown,
-                mesh,
-                joints.size,
-                batched_scales=np.full(joints.size, 1e-9),
-                batched_colors=np.zeros((joints.size, 3), dtype=np.uint8),
-            )
-            self.layers[toggle].append(Layer(handle, Loads(half, self.style, joints)))
+            is_open = self._open[joints, half]
+            for shape, some in ((mesh, joints[~is_open]), (dashed[half], joints[is_open])):
+                if not some.size:
+                    continue
+                handle = self._add(
+                    toggle,
+                    shown,
+                    shape,
+                    some.size,
+                    batched_scales=np.full(some.size, 1e-9),
+                    batched_colors=np.zeros((some.size, 3), dtype=np.uint8),
+                )
+                self.layers[toggle].append(Layer(handle, Loads(half, self.style, some)))
 
     # -- view -------------------------------------------------------------------------------
 

@@ -93,6 +93,31 @@ def unit_arrow(sides: int = 10) -> Mesh:
     return turned([(0, 0), (0.022, 0), (0.022, 0.78), (0.065, 0.78), (0, 1)], sides)
 
 
+def dashed_arrow(sides: int = 10) -> Mesh:
+    """As `unit_arrow`, with gaps in its shaft."""
+    ends = np.linspace(0, 0.78, 6)
+    dashes = [
+        turned([(0, low), (0.022, low), (0.022, low + 0.095), (0, low + 0.095)], sides)
+        for low in ends[:-1]
+    ]
+    return joined([*dashes, turned([(0, 0.78), (0.065, 0.78), (0, 1)], sides)])
+
+
+def joined(meshes: list[Mesh]) -> Mesh:
+    """All of them as one."""
+    counts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + first for mesh, first in zip(meshes, counts[:-1], strict=True)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def dashed_arc(sides: int = 6, pieces: int = 28) -> Mesh:
+    """As `unit_arc`, with gaps: every other one of its pieces but for the head."""
+    whole = unit_arc(sides, pieces)
+    band = len(whole.faces) // (pieces + 1)
+    at = np.arange(len(whole.faces)) // band
+    return Mesh(whole.vertices, whole.faces[(at % 4 < 2) | (at >= pieces)])
+
+
 def unit_arc(sides: int = 6, pieces: int = 28) -> Mesh:
     """Three quarters of a circle of radius 0.5 about z, with a head: a right-handed moment."""
     turn = 1.5 * np.pi

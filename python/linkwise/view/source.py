@@ -10,13 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from linkwise import _core
 from linkwise._core import InputError, Model
-from linkwise.base import Array, rows_per_block
+from linkwise.base import AnyArray, Array, rows_per_block
 from linkwise.io.complaint import near, shorten
 from linkwise.io.load import load
 from linkwise.io.urdf_visuals import Appearance, read_appearance
+from linkwise.loads.determinate import FEW_ROWS, components_of, loop_rows
 from linkwise.loads.extremes import loads_at_peaks, missed_peaks
 from linkwise.loads.samples import held_model, model_of, rows
+from linkwise.loads.undecided import undecided_loads
 from linkwise.notes import plain_warnings, warnings_of
 from linkwise.record.model import read_model
 from linkwise.results import Run, open_run
@@ -137,7 +140,9 @@ class Source:
     """A model, how its links look, and the samples of a run (None: the model alone).
 
     notes: what is not shown as it looks; warnings: what was ignored or assumed when the model was
-    read.
+    read; determinate: (joints, 6) which loads are known, None: all; start: the position (nq,) in
+    which a model alone is first shown, as near as its loops can be closed with the joints `held`
+    where they are.
     """
 
     title: str
@@ -147,6 +152,15 @@ class Source:
     ratings: Mapping[str, Rating] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     warnings: Sequence[Mapping[str, str]] = ()
+    determinate: AnyArray | None = None
+    start: Array | None = None
+    held: Sequence[str] = ()
+
+    @property
+    def first_position(self) -> Array:
+        """(nq,) [rad, m] of a model alone; loops may be open."""
+        drawn = self.model.initial_configuration() if self.start is None else self.start
+        return np.array(drawn, dtype=float)
 
 
 def open_source(target: PathLike, options: Options) -> Source:
@@ -163,11 +177,38 @@ def open_source(target: PathLike, options: Options) -> Source:
         raise InputError(f"{str(path)!r}: causes go with a run, and this is a file; leave them out")
     model, file, package_dirs = _load_model(path, options)
     appearance = Appearance([], [], []) if file is None else read_appearance(file, package_dirs)
-    held = load_scenario(path).text if path.suffix.lower() == ".toml" else ""
-    ratings = _ratings(options, held)
     ignored = plain_warnings(warnings_of(model))
     notes = _notes(appearance)
-    return Source(model.name, model, appearance, None, ratings, notes, ignored)
+    if path.suffix.lower() != ".toml":
+        ratings, known = _ratings(options, ""), _known(model, None, [], notes)
+        return Source(model.name, model, appearance, None, ratings, notes, ignored, known)
+    scenario = load_scenario(path)
+    ratings = _ratings(options, scenario.text)
+    start, held = scenario.first_position(model)
+    known = _known(model, start, held, notes)
+    return Source(model.name, model, appearance, None, ratings, notes, ignored, known, start, held)
+
+
+def _known(
+    model: Model, start: Array | None, held: Sequence[str], notes: list[str]
+) -> AnyArray | None:
+    """Which components (joints, 6) of its loads are determinate in the pose that is shown first,
+    None where all are or nobody can say; adds to the notes what would decide the others."""
+    if not 0 < loop_rows(model) <= FEW_ROWS:
+        return None
+    q = model.initial_configuration() if start is None else start
+    try:
+        closed = _core.assemble(model, q, np.zeros(model.nv), list(held))["q"]
+        known = np.asarray(_core.indeterminacy(model, closed).determinate, dtype=np.bool_)
+        if known.all():
+            return None
+        notes += [_DASHED, *(one.text for one in undecided_loads(model, closed))]
+    except InputError:  # the view says where loops stay open
+        return None
+    return known
+
+
+_DASHED = "dashed arrows and numbers in brackets are one choice of many: rigid bodies do not decide"
 
 
 def _ratings(options: Options, scenario: str) -> Mapping[str, Rating]:
@@ -217,7 +258,10 @@ def _open_run(path: Path, options: Options) -> Source:
     missed = missed_peaks(run) if options.loads else []
     if missed:
         notes.append(f"arrows and colours are of the samples: {missed[0]}")
-    return Source(model.name, model, appearance, recording, ratings, notes, run.warnings)
+    known = components_of(run) if options.loads else None
+    if known is not None and not known.all():
+        notes.append(_DASHED)
+    return Source(model.name, model, appearance, recording, ratings, notes, run.warnings, known)
 
 
 def _file_beside(path: Path, name: str) -> Path | None:

@@ -50,8 +50,9 @@ class ArticulatedLoops {
   /// Joint loads [n_loads][6] of self-stress k, found before.
   void self_stress(int group, int k, const double* q, double* loads) const;
   /// Self-stresses of a group that no bearing decides: joint loads [n][n_loads][6], one after the
-  /// other behind `loads`.
-  void append_undecided(int group, const double* q, std::vector<double>& loads);
+  /// other behind `loads`. couplings [n_couplings]: marks those that such a self-stress loads.
+  void append_undecided(int group, const double* q, std::vector<double>& loads,
+                        std::vector<char>& couplings);
   /// How far the longest loop reaches, m; 1 where there is none.
   double longest_loop() const;
 
@@ -78,8 +79,10 @@ class ArticulatedLoops {
   void store_loop_load(int l, const Force<double>& w, double* loads) const;
   void make_bearing_shares();
   void store_stress(int g, const double* f, const double* q, double* loads) const;
+  double size_of(const LoopGroup::Member& member, const double* f, const double* q) const;
+  void mark_couplings(int g, const double* f, const double* q, std::vector<char>& marks) const;
   int find_stresses(int g, const double* q);
-  void share_by_bearings(int g, const double* q, double* loads);
+  void share_by_bearings(int g, const double* q, double misfit, double* loads);
 
   const Model& model_;
   TreeSweeps<double> sweeps_;

@@ -154,9 +154,92 @@ std::string contradiction(const Model& model, const LoopStates& states, int l) {
          " closes";
 }
 
+/// To so many digits that it closes what it is said to close.
+std::string in_full(double x) {
+  std::ostringstream text;
+  text << std::setprecision(9) << x;
+  return text.str();
+}
+
+/// What has to be added to a length so that links meet: slightly more, to leave the dead end.
+double enough(double missing) { return 1.001 * missing; }
+
+bool closes(ModelSpec spec, std::vector<double> q, const LoopMotion& given) {
+  const Model model(std::move(spec));
+  Closing closing(model);
+  closing.loops().give(given);
+  return closing.close(q);
+}
+
+/// Of the loop that is open the widest: one change of it that was found to close them all, or "".
+std::string tried_remedy(const Model& model, const LoopStates& states, int l,
+                         const std::vector<double>& q, const LoopMotion& given) {
+  const LoopJoint& loop = model.loops.joints[l];
+  const LoopState& state = states[l];
+  const int at = loop.joint.spec - static_cast<int>(model.spec().joints.size());
+  if (at < 0 || at >= static_cast<int>(model.spec().loop_joints.size())) return "";
+  ModelSpec spec = model.spec();
+  LoopJointSpec& own = spec.loop_joints[at];
+  if (loop.kind == LoopKind::rod) {
+    own.length += enough(state.gap[0]);
+    if (!(own.length > 0) || !closes(spec, q, given)) return "";
+    return "give it the length " + in_full(own.length) + " m, which closes it, or ";
+  }
+  constexpr double rounding = 1e-6;
+  const LoopMiss miss = miss_of(state, state.gap);
+  if (miss.turn * state.length > rounding * miss.shift) return "";
+  Vec3<double> shift;
+  for (int i = 0; i < state.held; ++i) {
+    const Vector6<double>& Q = state.basis.Q[i];
+    shift += state.gap[i] * Vec3<double>{Q[0], Q[1], Q[2]};
+  }
+  shift = enough(1) * (own.child_rotation * (loop.joint.to_user.R * shift));
+  std::string where;
+  double* const point = &own.child_translation.x;
+  for (int i = 0; i < 3; ++i) {
+    const double by = (&shift.x)[i];
+    point[i] -= std::abs(by) > rounding * miss.shift ? by : 0;
+    where += (i == 0 ? "(" : ", ") + in_full(point[i]);
+  }
+  if (!closes(spec, q, given)) return "";
+  return "place its point at " + where + ") m on '" + own.joint.child + "', which closes it, or ";
+}
+
+/// The same of a coupling: "" where another offset is not enough.
+std::string tried_offset(const Model& model, size_t coupling, double offset,
+                         const std::vector<double>& q, const LoopMotion& given) {
+  ModelSpec spec = model.spec();
+  spec.couplings[coupling].offset = offset;
+  if (!closes(std::move(spec), q, given)) return "";
+  return "give it the offset " + in_full(offset) + ", which closes it, or ";
+}
+
+[[noreturn]] void refuse_coupling(const Model& model, const LoopStates& states,
+                                  const std::vector<double>& q, const LoopMotion& given) {
+  size_t worst = 0;
+  double largest = -1;
+  const CoupledState at = coupled_state(q.data(), nullptr, states);
+  for (size_t c = 0; c < model.couplings.size(); ++c)
+    if (const double gap = std::abs(miss_of(model.couplings[c], at).gap); gap > largest) {
+      largest = gap;
+      worst = c;
+    }
+  const Coupling& coupling = model.couplings[worst];
+  const double gap = miss_of(coupling, at).gap;
+  throw InputError("coupling '" + coupling.name + "'" + model.where() +
+                   " cannot be kept: at best its coordinates add up to " + rounded(gap) +
+                   " beside its offset; " +
+                   tried_offset(model, worst, coupling.offset + enough(gap), q, given) +
+                   "change its factors, hold fewer joints, or start from another position");
+}
+
 [[noreturn]] void refuse_position(const Model& model, const LoopStates& states,
-                                  const std::vector<double>& q) {
-  require_coupled(model, states, q.data(), nullptr);
+                                  const std::vector<double>& q, const LoopMotion& motion) {
+  try {
+    require_coupled(model, states, q.data(), nullptr);
+  } catch (const InputError&) {
+    refuse_coupling(model, states, q, motion);
+  }
   const int l = widest(model, states, false);
   const LoopJoint& loop = model.loops.joints[l];
   const LoopMiss miss = miss_of(states[l], states[l].gap);
@@ -172,8 +255,9 @@ std::string contradiction(const Model& model, const LoopStates& states, int l) {
   throw InputError("joint '" + loop.joint.name + "'" + model.where() +
                    " cannot close its loop: at best it is open by " + rounded(1e3 * miss.shift) +
                    " mm and " + rounded(miss.turn) + " rad between " + link(loop.parent_link) +
-                   " and " + link(loop.joint.link) +
-                   "; change lengths or the places of its joints, hold fewer joints, or start "
+                   " and " + link(loop.joint.link) + "; " +
+                   tried_remedy(model, states, l, q, motion) +
+                   "change lengths or the places of its joints, hold fewer joints, or start "
                    "from another position");
 }
 
@@ -243,7 +327,7 @@ Assembly assemble(const Model& model, std::vector<double> q, std::vector<double>
     const bool done = closing.close(out.q);
     if (!done && n > 0) continue;
     closing.loops().gap(out.q.data());
-    if (!done) refuse_position(own, closing.loops().states(), out.q);
+    if (!done) refuse_position(own, closing.loops().states(), out.q, given);
     make_consistent(own, closing.loops(), out.q, out.v);
     out.released.assign(hold.begin() + static_cast<std::ptrdiff_t>(n), hold.end());
     out.moved = changes(model, q, out.q);

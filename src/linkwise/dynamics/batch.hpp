@@ -30,7 +30,7 @@ struct BatchInput {
 enum class BatchMethod { articulated_body, constraint_force };
 
 /// What alone loads the joints while the mechanism gives way to it.
-enum class Cause { gravity, velocity, drive, motion, passive, external };
+enum class Cause { gravity, velocity, drive, motion, passive, external, misfit };
 
 /// One worker's scratch: everything is allocated at the first use of its kind.
 class BatchEvaluator {

@@ -29,10 +29,51 @@ void weigh(const Bearing& bearing, const double* loads, F&& weight, double* out,
 
 double root(double yields) { return std::sqrt(yields); }
 
+/// Axes of the body before a joint -> the user's axes of the joint, at coordinates of the tree, or
+/// of loop joints where it closes one.
+Mat3<double> axes_at(const Model& model, int load, const double* q, const double* loop_q) {
+  const bool closes = load >= model.n_joints();
+  const JointInfo& joint = model.joint_at(load);
+  const Element* const first =
+      (closes ? model.loops.elements : model.elements).data() + joint.first_element;
+  Mat3<double> R = Mat3<double>::identity();
+  for (int e = 0; e < joint.n_elements; ++e) R = element_pose(first[e], closes ? loop_q : q).R * R;
+  return joint.to_user.R * R;
+}
+
 }  // namespace
 
 BearingShares::BearingShares(const Model& model, std::vector<int> bearings)
-    : model_(model), bearings_(std::move(bearings)) {}
+    : model_(model), bearings_(std::move(bearings)), misfit_(bearings_.size()) {
+  const std::vector<double> q = model.neutral_configuration();
+  std::vector<double> loop_q(model.loops.nq);
+  for (const Element& e : model.loops.elements)
+    if (const int own = info_of(e.kind).quaternion; own >= 0) loop_q[e.q + own + 3] = 1;
+  for (const int b : bearings_) {
+    has_misfits_ |= model.bearings[b].has_misfit;
+    unturned_.push_back(transpose(axes_at(model, model.bearings[b].load, q.data(), loop_q.data())));
+  }
+}
+
+void BearingShares::place_misfits(const double* q, const LoopStates& loops) {
+  for (size_t b = 0; has_misfits_ && b < bearings_.size(); ++b) {
+    const Bearing& bearing = model_.bearings[bearings_[b]];
+    Mat3<double> R = axes_at(model_, bearing.load, q, loops.q().data()) * unturned_[b];
+    Vec3<double> offset = R * bearing.offset, turn = R * bearing.turn,
+                 preload = R * bearing.preload;
+    const int l = bearing.load - model_.n_joints();
+    if (l >= 0 && model_.loops.joints[l].kind == LoopKind::rod) {
+      const Vector6<double>& n = loops[l].row[0];
+      const Vec3<double> along =
+          model_.loops.joints[l].joint.to_user.R * Vec3<double>{n[0], n[1], n[2]};
+      offset = bearing.offset.z * along;
+      preload = bearing.preload.z * along;
+    }
+    offset += weighted(bearing.axis, bearing.across, bearing.along, preload);
+    misfit_[b] = {offset.x, offset.y, offset.z, turn.x, turn.y, turn.z};
+    leave_out_rigid(b, misfit_[b]);
+  }
+}
 
 void BearingShares::factor(int n, const double* S, double length) {
   n_ = n;
@@ -53,6 +94,10 @@ void BearingShares::factor(int n, const double* S, double length) {
     for (int k = 0; i % 6 >= 3 && k < n; ++k) rows_[i * n + k] /= length;
   structure_.factor(static_cast<int>(m), n, rows_.data(), touched * largest);
   decided_ = structure_.seen();
+  if (has_misfits_) {
+    length_ = length;
+    find_rigid(S, largest);
+  }
   fill(root);
   const auto r = static_cast<size_t>(structure_.rank());
   turned_.assign(m * r, 0.0);
@@ -62,13 +107,63 @@ void BearingShares::factor(int n, const double* S, double length) {
   weighted_.factor(static_cast<int>(m), static_cast<int>(r), turned_.data(), 0);
 }
 
-void BearingShares::solve(const double* w, double* alpha) {
+/// Moments count by a length, so that turns do by its inverse.
+void BearingShares::find_rigid(const double* S, double largest) {
+  const std::vector<double> sums = structure_.unseen();
+  const size_t width = 6 * static_cast<size_t>(model_.n_loads());
+  rigid_.assign(bearings_.size(), {});
+  for (size_t b = 0; b < bearings_.size(); ++b)
+    for (size_t s = 0; n_ > 0 && s < sums.size() / n_; ++s) {
+      double load[6] = {};
+      for (int k = 0; k < n_; ++k)
+        for (int i = 0; i < 6; ++i)
+          load[i] += sums[s * n_ + k] * S[k * width + 6 * model_.bearings[bearings_[b]].load + i] /
+                     (i < 3 ? 1 : length_);
+      std::vector<double>& own = rigid_[b];
+      for (int pass = 0; pass < 2; ++pass)
+        for (size_t r = 0; r < own.size() / 6; ++r) {
+          double part = 0;
+          for (int i = 0; i < 6; ++i) part += own[6 * r + i] * load[i];
+          for (int i = 0; i < 6; ++i) load[i] -= part * own[6 * r + i];
+        }
+      double size = 0;
+      for (const double x : load) size += x * x;
+      size = std::sqrt(size);
+      if (!(size > touched * largest)) continue;
+      for (const double x : load) own.push_back(x / size);
+    }
+}
+
+void BearingShares::leave_out_rigid(size_t b, Vector6<double>& misfit) const {
+  const std::vector<double>& own = rigid_[b];
+  for (size_t r = 0; r < own.size() / 6; ++r) {
+    double part = 0;
+    for (int i = 0; i < 6; ++i) part += own[6 * r + i] * misfit[i] * (i < 3 ? 1 : length_);
+    for (int i = 0; i < 6; ++i) misfit[i] -= part * own[6 * r + i] / (i < 3 ? 1 : length_);
+  }
+}
+
+void BearingShares::solve(const double* w, const double* S, double misfit, double* alpha) {
   b_.resize(6 * bearings_.size());
   for (size_t b = 0; b < bearings_.size(); ++b)
     weigh(model_.bearings[bearings_[b]], w, root, &b_[6 * b], 1);
   const auto r = static_cast<size_t>(structure_.rank());
   x_.resize(r);
   weighted_.solve(b_.data(), x_.data());
+  if (has_misfits_ && misfit != 0) {
+    const size_t width = 6 * static_cast<size_t>(model_.n_loads());
+    gap_.assign(r, 0.0);
+    for (int k = 0; k < n_; ++k) {
+      double open = 0;
+      for (size_t b = 0; b < bearings_.size(); ++b)
+        for (int i = 0; i < 6; ++i)
+          open += S[k * width + 6 * model_.bearings[bearings_[b]].load + i] * misfit_[b][i];
+      for (size_t c = 0; c < r; ++c) gap_[c] += misfit * open * decided_[c * n_ + k];
+    }
+    turned_gap_.resize(r);
+    weighted_.solve_normal(gap_.data(), turned_gap_.data());
+    for (size_t c = 0; c < r; ++c) x_[c] -= turned_gap_[c];
+  }
   std::fill_n(alpha, n_, 0.0);
   for (size_t c = 0; c < r; ++c)
     for (int k = 0; k < n_; ++k) alpha[k] += x_[c] * decided_[c * n_ + k];

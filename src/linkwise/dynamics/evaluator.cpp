@@ -22,7 +22,8 @@ struct CauseEntry {
 };
 constexpr CauseEntry causes[] = {{"gravity", Cause::gravity}, {"velocity", Cause::velocity},
                                  {"drive", Cause::drive},     {"motion", Cause::motion},
-                                 {"passive", Cause::passive}, {"external", Cause::external}};
+                                 {"passive", Cause::passive}, {"external", Cause::external},
+                                 {"misfit", Cause::misfit}};
 
 void check_prescribed(const Model& m, const BatchInput& s) {
   if (s.prescribed && m.spec().prescribed.empty())
@@ -125,6 +126,7 @@ void each_cause_alone(const Model& m, DynamicsMethod& method, size_t count,
       if (cause == Cause::motion) in.prescribed = all.prescribed;
       if (cause == Cause::external) in.external = all.external;
       in.gravity_factor = cause == Cause::gravity ? all.gravity_factor : 0;
+      in.misfit_factor = cause == Cause::misfit ? 1 : 0;
       const DynamicsReport r = method.evaluate(0, in, du.data(), loads);
       if (report.ok() && !r.ok()) report = r;
       if (report.ok() && !rows_finite(loads, 0, 1, width)) report.outcome = Outcome::not_finite;

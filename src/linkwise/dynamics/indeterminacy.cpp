@@ -13,12 +13,12 @@ namespace {
 /// Of the largest component of a self-stress: what is less is rounding.
 constexpr double touched = 1e-8;
 
-/// Makes the largest component 1, where moments count by a length.
+/// Makes the largest component 1, where moments count by a length; what loads no joint stays 0.
 void normalise(double* loads, size_t n_loads, double length) {
   double largest = 0;
   for (size_t i = 0; i < 6 * n_loads; ++i)
     largest = std::max(largest, std::abs(loads[i]) / (i % 6 < 3 ? 1 : length));
-  for (size_t i = 0; i < 6 * n_loads; ++i) loads[i] /= largest;
+  for (size_t i = 0; largest > 0 && i < 6 * n_loads; ++i) loads[i] /= largest;
 }
 
 /// Marks the components that a self-stress loads.
@@ -34,6 +34,7 @@ Indeterminacy find_indeterminacy(const Model& model, const double* q) {
   const size_t n_loads = model.n_loads();
   out.determinate.assign(6 * n_loads, 1);
   out.by_bearings.assign(6 * n_loads, 0);
+  out.couplings.assign(model.n_couplings(), 1);
   for (const Element& e : model.elements) out.mobility += e.prescribed ? 0 : e.nv;
   if (!model.is_constrained()) return out;
   ArticulatedLoops kernel(model);
@@ -52,6 +53,7 @@ Indeterminacy find_indeterminacy(const Model& model, const double* q) {
   out.rows = kernel.report().rows;
   const double length = kernel.longest_loop();
   std::vector<char> by_any(loads.size()), by_open(loads.size());
+  std::vector<char> open_couplings(model.n_couplings());
   for (int g = 0; g < static_cast<int>(kernel.groups().size()); ++g) {
     const int n = kernel.find_self_stresses(g);
     for (int k = 0; k < n; ++k) {
@@ -61,8 +63,9 @@ Indeterminacy find_indeterminacy(const Model& model, const double* q) {
       out.self_stresses.insert(out.self_stresses.end(), loads.begin(), loads.end());
     }
     out.n_self_stresses += n;
-    kernel.append_undecided(g, q, out.undecided);
+    kernel.append_undecided(g, q, out.undecided, open_couplings);
   }
+  for (int c = 0; c < model.n_couplings(); ++c) out.couplings[c] = !open_couplings[c];
   out.n_undecided = static_cast<int>(out.undecided.size() / loads.size());
   for (int k = 0; k < out.n_undecided; ++k) {
     double* const own = &out.undecided[k * loads.size()];

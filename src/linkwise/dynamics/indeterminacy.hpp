@@ -23,6 +23,7 @@ struct Indeterminacy {
   std::vector<double> undecided;
   std::vector<char> determinate;  ///< [n_loads][6]
   std::vector<char> by_bearings;  ///< determinate, but not by rigid bodies alone
+  std::vector<char> couplings;    ///< [n_couplings]: whether the load of each is determinate
 };
 
 /// At position q, which must close the loops: InputError otherwise.

@@ -29,6 +29,8 @@ struct SweepInput {
   LoopListener* on_loops = nullptr;
   /// Times the model's gravity; 0 leaves it out.
   double gravity_factor = 1;
+  /// Times what bearings do not fit by; 0 leaves it out.
+  double misfit_factor = 1;
 };
 
 /// Told of loop joints before anything acts on them: it may give them torques, or throw.

@@ -64,6 +64,21 @@ void PivotedQr::solve(const double* b, double* x) {
   for (int i = 0; i < rank_; ++i) x[order_[i]] = y_[i];
 }
 
+void PivotedQr::solve_normal(const double* b, double* x) {
+  y_.resize(std::max(m_, n_));
+  for (int i = 0; i < rank_; ++i) {
+    y_[i] = b[order_[i]];
+    for (int j = 0; j < i; ++j) y_[i] -= row(j)[i] * y_[j];
+    y_[i] /= row(i)[i];
+  }
+  for (int i = rank_ - 1; i >= 0; --i) {
+    for (int j = i + 1; j < rank_; ++j) y_[i] -= row(i)[j] * y_[j];
+    y_[i] /= row(i)[i];
+  }
+  std::fill_n(x, n_, 0.0);
+  for (int i = 0; i < rank_; ++i) x[order_[i]] = y_[i];
+}
+
 std::vector<double> PivotedQr::seen() const {
   std::vector<double> out(static_cast<size_t>(rank_) * n_);
   for (int i = 0; i < rank_; ++i)

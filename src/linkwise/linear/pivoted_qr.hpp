@@ -16,6 +16,8 @@ class PivotedQr {
   int rank() const { return rank_; }
   /// x [n] of the least |A x - b|, b [m], where the rank is n.
   void solve(const double* b, double* x);
+  /// x [n] of A^T A x = b, b [n], where the rank is n.
+  void solve_normal(const double* b, double* x);
   /// Orthonormal columns [n][rank] whose span A sees, and [n][n - rank] that it does not, each
   /// vector after the other.
   std::vector<double> seen() const;

@@ -217,6 +217,43 @@ ModelSpec with_joints(ModelSpec spec,
   return spec;
 }
 
+ModelSpec with_more_freedom(ModelSpec spec, const std::string& joint, JointType type) {
+  const std::string head = "joint '" + joint + "'" + source_of(spec) + ": ";
+  JointSpec* found = nullptr;
+  for (JointSpec& one : spec.joints)
+    if (one.name == joint) found = &one;
+  for (LoopJointSpec& loop : spec.loop_joints)
+    if (loop.joint.name == joint && loop.kind == LoopKind::joint) found = &loop.joint;
+  if (!found) throw InputError(head + "is no joint of the machine; name one of its joints");
+  const bool turns = found->type == JointType::revolute || found->type == JointType::continuous,
+             slides = found->type == JointType::prismatic;
+  const bool fits =
+      type == JointType::cylindrical ? turns || slides : type == JointType::spherical && turns;
+  if (!fits)
+    throw InputError(head + "a " + joint_type_name(found->type) + " joint cannot become " +
+                     joint_type_name(type) +
+                     "; hinges may become cylindrical or spherical, sliders cylindrical");
+  const double at = found->initial.empty() ? 0 : found->initial[0];
+  found->type = type;
+  if (type == JointType::spherical) {
+    const Vec3<double> axis =
+        (std::sin(at / 2) / std::sqrt(dot(found->axes[0].axis, found->axes[0].axis))) *
+        found->axes[0].axis;
+    if (at != 0) found->initial = {axis.x, axis.y, axis.z, std::cos(at / 2)};
+    found->dof.clear();
+    found->axes.clear();
+    return spec;
+  }
+  if (!found->initial.empty())
+    found->initial = turns ? std::vector<double>{0, at} : std::vector<double>{at, 0};
+  for (DofValue& value : found->dof) {
+    const double free = dof_property_table[static_cast<int>(value.property)].fallback;
+    value.values.resize(1);
+    value.values.insert(turns ? value.values.begin() : value.values.end(), free);
+  }
+  return spec;
+}
+
 ModelSpec with_payload(ModelSpec spec, const std::string& link, LinkSpec payload) {
   JointSpec weld;
   weld.name = payload.name + "_mount";

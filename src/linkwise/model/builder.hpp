@@ -78,6 +78,11 @@ ModelSpec make_chain(const EqualChain& chain);
 ModelSpec with_joints(ModelSpec spec,
                       std::vector<std::pair<std::string, Properties>> properties_of);
 
+/// The same machine with a hinge or slider that is cylindrical or spherical instead, where it was;
+/// what acts on its coordinate stays in a cylindrical one, and goes in a spherical one. Throws
+/// InputError for other joints and types.
+ModelSpec with_more_freedom(ModelSpec spec, const std::string& joint, JointType type);
+
 /// The same machine with one more link welded to one of its links.
 ModelSpec with_payload(ModelSpec spec, const std::string& link, LinkSpec payload);
 

@@ -134,6 +134,10 @@ struct Bearing {
   Vec3<double> axis;        ///< of unit length
   double across, along;     ///< m/N, to a force; 0: rigid
   double tilting, turning;  ///< rad/(N m), to a moment across and about the axis
+  /// What its child is out of place by without load [m, rad], and the force whose share of that is
+  /// what it yields to it [N]: in the parent's axes of the joint. Of a rod z is along it.
+  Vec3<double> offset{}, turn{}, preload{};
+  bool has_misfit = false;
 };
 
 /// Where a link of the file is: on which joint's frame (-1: ground), and how it is placed there.

@@ -14,9 +14,10 @@ namespace {
 
 // Machines without loops are described as they always were, where what is as usual may be left out
 // at the end. Others are described in full, so that bytes cut short are no other machine.
-// So are those with bearings, whose list stands last.
-constexpr const char* magics[] = {"linkwise-model-1", "linkwise-model-2", "linkwise-model-3"};
-constexpr int in_full = 1, with_bearings = 2;
+// So are those with bearings, whose list stands last, and those whose bearings do not fit.
+constexpr const char* magics[] = {"linkwise-model-1", "linkwise-model-2", "linkwise-model-3",
+                                  "linkwise-model-4"};
+constexpr int in_full = 1, with_bearings = 2, with_misfits = 3;
 
 struct Writer {
   std::string bytes;
@@ -172,6 +173,10 @@ void spec_fields(A& archive, Spec& spec) {
     for (auto* x : {&bearing.radial, &bearing.axial, &bearing.tilt, &bearing.torsion})
       archive.raw(x, sizeof(double));
     archive.raw(&bearing.axis.x, 3 * sizeof(double));
+    if (archive.extent < with_misfits) continue;
+    for (auto* x : {&bearing.offset, &bearing.turn, &bearing.preload})
+      archive.raw(&x->x, 3 * sizeof(double));
+    for (auto* x : {&bearing.offset_along, &bearing.preload_along}) archive.raw(x, sizeof(double));
   }
 }
 
@@ -179,13 +184,18 @@ void spec_fields(A& archive, Spec& spec) {
 
 std::string serialize(const ModelSpec& spec) {
   const bool loops = !spec.loop_joints.empty() || !spec.couplings.empty();
-  Writer writer(!spec.bearings.empty() ? with_bearings : loops ? in_full : 0);
+  const bool misfits = std::any_of(spec.bearings.begin(), spec.bearings.end(),
+                                   [](const BearingSpec& bearing) { return bearing.has_misfit(); });
+  Writer writer(misfits                  ? with_misfits
+                : !spec.bearings.empty() ? with_bearings
+                : loops                  ? in_full
+                                         : 0);
   spec_fields(writer, spec);
   return std::move(writer.bytes);
 }
 
 ModelSpec deserialize(const std::string& bytes) {
-  int extent = with_bearings;
+  int extent = with_misfits;
   while (extent >= 0 && !bytes.starts_with(magics[extent])) --extent;
   if (extent < 0)
     throw InputError(

@@ -141,11 +141,21 @@ struct CouplingSpec {
 /// How much a joint yields to its load, on top of the motions that it leaves: stiffness across and
 /// along an axis in the joint's frame, against tilting the axis and against turning about it.
 /// It moves nothing, and decides what rigid bodies leave open: dynamics/bearing_shares.hpp.
+/// A misfit is where the child would stand against the parent without load, past where the joint
+/// has it: in the parent's axes of the joint, and along the bearing's axis. A preload is the load
+/// that makes a misfit of the stiffness times it.
 struct BearingSpec {
   std::string joint;
   double radial = infinity, axial = infinity;  ///< N/m
   double tilt = infinity, torsion = infinity;  ///< N m/rad
   Vec3<double> axis{};                         ///< 0: the joint's own
+  Vec3<double> offset{}, turn{}, preload{};    ///< m, rad, N
+  double offset_along = 0, preload_along = 0;  ///< m, N, besides
+
+  bool has_misfit() const {
+    return dot(offset, offset) + dot(turn, turn) + dot(preload, preload) > 0 || offset_along != 0 ||
+           preload_along != 0;
+  }
 };
 
 enum class NoteLevel { merge, warning, info };

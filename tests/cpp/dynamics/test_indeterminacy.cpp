@@ -149,6 +149,35 @@ TEST(Indeterminacy, ADoorOnTwoHinges) {
   }
 }
 
+// What gears in a ring put into a wheel cancels there, whatever the sizes: rounding is no load.
+TEST(Indeterminacy, GearsInARingLoadNoJoint) {
+  for (const double scale : {1.0, 1e-7, 1e7}) {
+    SCOPED_TRACE(scale);
+    ModelSpec spec;
+    spec.links.push_back({"base", 0, {}, {}});
+    for (int k = 0; k < 3; ++k) {
+      spec.links.push_back(rod(k == 0 ? "a" : k == 1 ? "b" : "c", {1, 0.3 * k, 0.1}));
+      JointSpec joint;
+      joint.name = "hinge_" + spec.links.back().name;
+      joint.parent = "base";
+      joint.child = spec.links.back().name;
+      joint.axes = {{AxisKind::revolute, {0, 0, 1}, 0}};
+      joint.translation = {0.7 * k, 0, 0};
+      spec.joints.push_back(joint);
+    }
+    spec.couplings = {{"ab", {{"hinge_a", scale}, {"hinge_b", scale / 3}}, 0},
+                      {"bc", {{"hinge_b", 0.7}, {"hinge_c", 1}}, 0},
+                      {"ca", {{"hinge_a", 2.1}, {"hinge_c", -1}}, 0}};
+    const Model model(spec);
+    const std::vector<double> q(3);
+    const Indeterminacy found = find_indeterminacy(model, q.data());
+    EXPECT_EQ(found.n_self_stresses, 1);
+    EXPECT_EQ(found.mobility, 1);
+    for (int j = 0; j < 3; ++j) EXPECT_EQ(mask(found, j), "111111");
+    for (const char known : found.couplings) EXPECT_FALSE(known);
+  }
+}
+
 // A self-stress, added to the loads, leaves Newton and Euler as they are.
 TEST(Indeterminacy, SelfStressesOfRandomMachinesCancel) {
   int seen = 0;

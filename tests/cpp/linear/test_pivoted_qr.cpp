@@ -57,6 +57,21 @@ TEST(PivotedQr, RowsNineDecadesApartKeepTheirDigits) {
   EXPECT_NEAR(x[1], 1.0 / 3, 1e-15);
 }
 
+TEST(PivotedQr, SolvesNormalEquations) {
+  const int m = 7, n = 4;
+  const std::vector<double> A = random_numbers(m * n, 5), x = random_numbers(n, 6);
+  std::vector<double> b(n), found(n);
+  for (int i = 0; i < m; ++i) {
+    double product = 0;
+    for (int j = 0; j < n; ++j) product += A[i * n + j] * x[j];
+    for (int j = 0; j < n; ++j) b[j] += A[i * n + j] * product;
+  }
+  PivotedQr qr;
+  qr.factor(m, n, A.data(), 1e-12);
+  qr.solve_normal(b.data(), found.data());
+  for (int j = 0; j < n; ++j) EXPECT_NEAR(found[j], x[j], 1e-12);
+}
+
 TEST(PivotedQr, SplitsColumnsIntoWhatIsSeenAndWhatIsNot) {
   const int m = 6, n = 5, rank = 3;
   const std::vector<double> left = random_numbers(m * rank, 3), right = random_numbers(rank * n, 4);

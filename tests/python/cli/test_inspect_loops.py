@@ -43,3 +43,18 @@ def test_wheels_that_are_geared_in_a_ring(linkwise, tmp_path):
     shown = " ".join(linkwise("inspect", tmp_path / "gears.toml").out.split())
     said = "3 couplings: 3 - 3 = 0 degrees of freedom by counting, 1 as drawn, with 1 self-stress"
     assert said in shown
+    assert "coupling 'c' hold each other; one of them repeats the others" in shown
+    (only,) = found["undecided"]
+    assert (only["joints"], only["couplings"]) == ({}, ["a", "b", "c"])
+
+
+def test_what_is_undecided_and_what_decides_it(linkwise, tmp_path):
+    """A slider-crank holds its plane three times over; a rod on ball joints would not."""
+    path = tmp_path / "press.sdf"
+    path.write_text(PRESS)
+    shown = " ".join(linkwise("inspect", path).out.split())
+    assert "Loads that rigid bodies and bearings do not decide" in shown
+    assert "hold each other in 3 ways; to decide it, say how stiff their bearings are" in shown
+    (only,) = linkwise("inspect", path, "--json").json["undecided"]
+    assert only["self_stresses"] == 3
+    assert len(only["remedies"]) == 2

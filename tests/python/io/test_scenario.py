@@ -186,7 +186,7 @@ def test_every_argument_is_one_of_simulate(write):
     inspect.signature(lw.simulate).bind("model", **arguments(write()))
 
 
-UNITS = "known units: rad, deg, rev, m, cm, mm, km, s, ms, min, h, "
+UNITS = "known units: rad, deg, rev, mrad, m, cm, mm, um, km, s, ms, min, h, "
 
 
 @pytest.mark.parametrize(
@@ -298,7 +298,7 @@ UNITS = "known units: rad, deg, rev, m, cm, mm, km, s, ms, min, h, "
         (
             "\n[initial]\nposition.slide = '3 deg'",
             ": initial.position.slide: has a unit of angle where a length belongs; "
-            "use one of m, cm, mm, km",
+            "use one of m, cm, mm, um, km",
         ),
         (
             "\n[initial]\nvelocity.shoulder = '3 parsec'",

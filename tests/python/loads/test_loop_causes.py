@@ -130,3 +130,19 @@ def test_a_singular_position_has_no_shares():
     shares = lw.loads.split(run)
     assert np.isnan(shares.values[1]).all()
     assert np.isfinite(shares.values[[0, 2]]).all()
+
+
+def test_passive_forces_are_a_cause_where_there_are_any():
+    machine = lw.scenes.benchmark("four_bars", n=1)
+    options = {"duration": 0.1, "q0": machine.q0, "v0": machine.v0}
+    bare = lw.loads.split(lw.simulate(machine.model, **options))
+    assert bare.cause.values.tolist() == ["gravity", "velocity"]
+    for joint in ("A0", "C1"):  # of the tree, and one that closes the loop
+        model = machine.model.with_joint(joint, damping=0.3)
+        run = lw.simulate(model, **options)
+        shares = lw.loads.split(run)
+        assert shares.cause.values.tolist() == ["gravity", "velocity", "passive"]
+        own = shares.sel(joint=joint, component="nz", cause="passive")
+        kind = "velocity" if joint == "A0" else "loop_velocity"
+        dof = {"dof" if joint == "A0" else "loop_dof": joint}
+        np.testing.assert_allclose(own, -0.3 * run[kind].sel(dof), rtol=1e-9, atol=1e-12)

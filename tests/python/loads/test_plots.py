@@ -85,3 +85,13 @@ def test_a_blow_between_the_samples_is_in_the_figures():
             expected = [[one.minimum_time, one.minimum], [one.maximum_time, one.maximum]]
             np.testing.assert_array_equal(drawn, np.array(expected, dtype=float))
     assert "peaks between the samples" in run.plot.split("elbow").axes[0].get_title()
+
+
+def test_what_is_one_choice_of_many_is_dashed():
+    machine = lw.scenes.benchmark("four_bars", n=1)
+    run = lw.simulate(machine.model, duration=0.1, q0=machine.q0, v0=machine.v0)
+    force, moment = run.plot.loads("A0").axes
+    styles = {line.get_label(): line.get_linestyle() for line in force.get_lines()}
+    assert (styles["fx"], styles["fy"], styles["(fz)"]) == ("-", "-", "--")
+    styles = {line.get_label(): line.get_linestyle() for line in moment.get_lines()}
+    assert (styles["(nx)"], styles["(ny)"], styles["nz"]) == ("--", "--", "-")

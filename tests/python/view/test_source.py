@@ -5,11 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_bearings import door
 
 import linkwise as lw
 from linkwise import base
 from linkwise.io.urdf_visuals import read_appearance
 from linkwise.record.model import GROUP, read_model
+from linkwise.view.pose import Pose
 from linkwise.view.source import Options, open_source
 
 URDF = """<robot name="arm">
@@ -190,3 +192,32 @@ def test_loads_of_another_machine_are_refused(urdf, tmp_path):
     held = run.load_model()
     again = lw.loads.split(lw.open_run(tmp_path / "run.zarr"), "force", held)
     assert again.identical(lw.loads.split(run, "force"))
+
+
+def test_a_scenario_starts_in_its_initial_position():
+    """The joint that it places is there, and the others have followed."""
+    source = open_source("examples/data/watt.toml", Options())
+    model = source.model
+    angle = np.deg2rad(20)
+    assert source.first_position[model.q_slice("left")] == pytest.approx(angle, abs=1e-15)
+    assert source.held == ["left"]
+    pose = Pose(model, source.held)
+    q = pose.assembled(source.first_position, None)
+    assert q[model.q_slice("left")] == pytest.approx(angle, abs=1e-12)
+    assert np.abs(lw.loop_gaps(model, q)).max() < 1e-12
+    assert pose.told.startswith("loops were open; moved to close them: ")
+    drawn = open_source("examples/data/watt.urdf", Options())
+    np.testing.assert_array_equal(drawn.first_position, model.initial_configuration())
+
+
+def test_which_loads_are_known_is_opened_with_them(tmp_path):
+    model = door("revolute")
+    run = lw.simulate(model, duration=0.05, output=tmp_path / "door.zarr")
+    source = open_source(run.path, Options())
+    np.testing.assert_array_equal(source.determinate, run.determinate)
+    assert any("dashed arrows" in note for note in source.notes)
+    source = open_source("examples/data/watt.urdf", Options())
+    assert source.determinate.any()
+    assert not source.determinate.all()
+    assert any("hold each other" in note for note in source.notes)
+    assert open_source("examples/data/hoist.urdf", Options()).determinate is None
