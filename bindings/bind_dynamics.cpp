@@ -238,7 +238,8 @@ void bind_loads(nb::module_& m) {
            "    method, solver: as of forward_dynamics.\n"},
           R"(    (..., n_joints + n_loops, 6) [N, N m]: the wrench that the inboard body exerts on the outboard
     body through the joint, drive and passive forces included, at the joint point, in the joint frame
-    of the outboard body, force first.)",
+    of the outboard body, force first. Of closed loops `indeterminacy(model, q).determinate` says which
+    components rigid bodies and bearings determine; the others are one choice of many.)",
           R"(a name is unknown, shapes do not fit the model, or a number is not finite.
     NumericsError: the method failed.)")
           .c_str());

@@ -74,7 +74,7 @@ class Determinacy:
         self._told: list[Undecided] = []
         self._misfits: list[tuple[str, str]] = []
         self._classify(q)
-        if self._count and explain:
+        if self._count and explain and small:
             self._told = describe(model, q, given) if self._self_stresses else []
             self._misfits = misfit_notes(model, q)
 
