@@ -130,6 +130,8 @@ def test_runs_say_it() -> None:
     assert any(text.startswith("'lower' fz and 'upper' fz hold each other") for text in said)
     locked = lw.simulate(door("revolute"), duration=0.01, drives={"lower": lw.Locked()})
     assert not any("make 'lower'" in w["text"] for w in locked.warnings)
+    locked = lw.simulate(door("revolute"), duration=0.01, drives={"upper": lw.Locked()})
+    assert any("'lower' fz and 'upper' fz hold each other" in w["text"] for w in locked.warnings)
 
 
 def test_trees_and_open_loops() -> None:

@@ -53,7 +53,10 @@ def inspect(
         screen.print(_loop_table(found["loops"], most))
     if found["undecided"]:
         screen.print(_undecided_table(found["undecided"]))
-    notes = found["notes"]
+    notes = found["notes"] + [
+        {"level": "warning", "element": told["joint"], "text": told["text"]}
+        for told in found.get("misfits", ())
+    ]
     if notes:
         screen.print(_note_table(notes, len(notes) if every_row else _MOST_ROWS))
 

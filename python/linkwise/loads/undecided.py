@@ -101,15 +101,14 @@ def undecided_loads(model: Model, q: Array | None = None) -> list[Undecided]:
         )
     if not rows:
         return []
-    where = model.initial_configuration() if q is None else np.asarray(q, dtype=float)
-    return describe(model, where, [])
+    return describe(model, model.initial_configuration() if q is None else q, [])
 
 
 def describe(model: Model, q: Array, given: Iterable[str]) -> list[Undecided]:
     """As `undecided_loads`, of a machine with joints that are locked or move as given."""
     held = list(given)
     found = Held(model, held).indeterminacy(q)
-    trial = _Trial(model, q, held, found)
+    trial = _Trial(model, np.asarray(q, dtype=float), held, found)
     return [
         Undecided(count, joints, couplings, trial.remedies(rows, couplings))
         for count, rows, joints, couplings in _blocks(model, found)
@@ -124,8 +123,10 @@ def _blocks(model: Model, found: Indeterminacy) -> list[_Block]:
     """Independent self-stresses, rows of loads, their components by joint, and couplings, of all
     that hold each other: parts of the reduced echelon form that share no row."""
     loads = np.asarray(found.undecided)
-    open_couplings = tuple(
-        name for name, known in zip(model.coupling_names, found.couplings, strict=True) if not known
+    open_couplings = tuple(  # what holds locked joints comes behind the model's own
+        name
+        for name, known in zip(model.coupling_names, found.couplings, strict=False)
+        if not known
     )
     silent = [k for k, one in enumerate(loads) if not one.any()]  # load couplings alone
     loud = np.delete(loads, silent, axis=0)

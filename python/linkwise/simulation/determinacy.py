@@ -102,7 +102,8 @@ class Determinacy:
             return
         self._count += 1
         self._by_bearings |= np.asarray(found.by_bearings)
-        names = zip(self._model.coupling_names, found.couplings, strict=True)
+        # What holds locked joints comes behind the model's own couplings.
+        names = zip(self._model.coupling_names, found.couplings, strict=False)
         self._couplings |= {name for name, known in names if not known}
         self._open += np.logical_not(found.determinate)
         self._self_stresses = max(self._self_stresses, len(found.undecided))

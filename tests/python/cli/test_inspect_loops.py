@@ -48,6 +48,18 @@ def test_wheels_that_are_geared_in_a_ring(linkwise, tmp_path):
     assert (only["joints"], only["couplings"]) == ({}, ["a", "b", "c"])
 
 
+def test_misfits_without_effect_are_noted(linkwise, tmp_path):
+    """One slider-crank is one planar loop: shims along its axes press, others move it."""
+    (tmp_path / "press.sdf").write_text(PRESS)
+    scenario = tmp_path / "press.toml"
+    scenario.write_text(
+        'model = "press.sdf"\n[bearing.drive]\naxial = "1 N/um"\nradial = "1 N/um"\n'
+        'offset = ["1 mm", 0, 0]\n[simulate]\nduration = 1\n'
+    )
+    shown = " ".join(linkwise("inspect", scenario).out.split())
+    assert "offset of its bearing along x: nothing holds against it, so it moves" in shown
+
+
 def test_what_is_undecided_and_what_decides_it(linkwise, tmp_path):
     """A slider-crank holds its plane three times over; a rod on ball joints would not."""
     path = tmp_path / "press.sdf"
