@@ -193,10 +193,11 @@ def test_a_scenario_gives_bearings(tmp_path) -> None:
         assert "\n" not in str(error.value)
 
 
-def test_the_graph_shares_nothing_among_bearings() -> None:
-    model = door().with_bearing("upper", axial=1e8, axis=(0, 0, 1))
+@pytest.mark.parametrize("method", ["constraint_force", "piecewise"])
+def test_the_recursion_alone_shares_among_bearings(method: str) -> None:
+    model = door("revolute").with_bearing("upper", axial=1e8)
     with pytest.raises(lw.InputError, match="use method articulated_body"):
-        loads(model, method="constraint_force")
+        loads(model, method=method)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-3])

@@ -109,6 +109,12 @@ def _gaps(m):
     np.testing.assert_allclose(lw.loop_gaps(m.model, m.q), 0, atol=1e-12)
 
 
+def _undecided_loads(m):
+    told = lw.undecided_loads(m.model, m.q)
+    open_rows = len(lw.indeterminacy(m.model, m.q).undecided)
+    assert sum(one.self_stresses for one in told) == open_rows
+
+
 def _indeterminacy(m):
     found = lw.indeterminacy(m.model, m.q)
     assert found.mobility == len(m.driven)
@@ -149,6 +155,7 @@ OF_STATES = {
     "assemble": _assemble,
     "forward_dynamics": _energy,
     "indeterminacy": _indeterminacy,
+    "undecided_loads": _undecided_loads,
     "inverse_dynamics": _inverse,
     "inverse_dynamics_loads": _inverse,
     "joint_loads": _causes,

@@ -66,7 +66,7 @@ def test_what_is_undecided_and_what_decides_it(linkwise, tmp_path):
     path.write_text(PRESS)
     shown = " ".join(linkwise("inspect", path).out.split())
     assert "Loads that rigid bodies and bearings do not decide" in shown
-    assert "hold each other in 3 ways; to decide it, say how stiff their bearings are" in shown
-    (only,) = linkwise("inspect", path, "--json").json["undecided"]
-    assert only["self_stresses"] == 3
-    assert len(only["remedies"]) == 2
+    assert "hold each other in 2 ways; to decide it, say how stiff their bearings are" in shown
+    told = linkwise("inspect", path, "--json").json["undecided"]
+    assert sum(one["self_stresses"] for one in told) == 3
+    assert all(len(one["remedies"]) == 2 for one in told)

@@ -106,7 +106,9 @@ def said_of_loads(run):
 
 
 def test_loads_that_rigid_bodies_leave_open_are_told(run):
-    (text,) = said_of_loads(run)
+    text, *what_decides = said_of_loads(run)
+    assert what_decides
+    assert all("hold each other" in told for told in what_decides)
     for joint in NAMES:
         assert f"'{joint}' (fz, nx, ny)" in text
     assert "6 self-stresses" in text
