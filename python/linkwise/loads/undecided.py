@@ -272,8 +272,10 @@ class _Trial:
         pairs = [(a, b) for a, b in combinations(some, 2) if a[0] != b[0]] if few else []
         for change in [*((one,) for one in some), *pairs]:
             if self._would_free(rows, change) and self._frees(rows, change):
-                kinds = [f"{self._names[j]!r} {kind}" for j, kind in change]
-                return f"make {_and(kinds)}"
+                by_kind: dict[str, list[str]] = {}
+                for j, kind in change:
+                    by_kind.setdefault(kind, []).append(repr(self._names[j]))
+                return f"make {_and([f'{_and(names)} {kind}' for kind, names in by_kind.items()])}"
         return ""
 
     def _would_free(self, rows: AnyArray, change: Sequence[tuple[int, str]]) -> bool:

@@ -208,7 +208,7 @@ def _known(
     return known
 
 
-_DASHED = "dashed arrows and numbers in brackets are one choice of many: rigid bodies do not decide"
+_DASHED = "dashed arrows and numbers in brackets are not determined by rigid bodies"
 
 
 def _ratings(options: Options, scenario: str) -> Mapping[str, Rating]:
