@@ -8,14 +8,16 @@ planar. Both sides are timed from Python; a call of Pinocchio's costs a microsec
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 import linkwise as lw
-from benchmarks import study, timing
+from benchmarks import exudyn_rows, study, timing
 from benchmarks.machine import Array
 from linkwise.scenes import benchmark
 from linkwise.scenes.benchmark import Benchmark
@@ -225,7 +227,7 @@ def our_motion(tolerance: float) -> dict[str, Any]:
     end = (pose @ np.array([0, 1, 0, 1]))[:2]
     error = float(np.linalg.norm(end - FORTY))
     setting = f"tolerance {tolerance:g}"
-    return {"engine": "linkwise", "setting": setting, "seconds": taken.seconds, "error": error}
+    return {"engine": "linkwise", "setting": setting, "seconds": taken.cpu, "error": error}
 
 
 def their_motion(step: float) -> dict[str, Any]:
@@ -256,11 +258,29 @@ def their_motion(step: float) -> dict[str, Any]:
     angle = data.qpos[0]
     error = float(np.linalg.norm(np.array([-np.sin(angle), np.cos(angle)]) - FORTY))
     return {
-        "engine": "MuJoCo",
+        "engine": f"MuJoCo {mujoco.__version__}",
         "setting": f"step {step:g} s",
-        "seconds": taken.seconds,
+        "seconds": taken.cpu,
         "error": error,
     }
+
+
+def exudyns_motion(step: float) -> dict[str, Any]:
+    end, taken = exudyn_rows.motion(40, step)
+    return {
+        "engine": f"Exudyn {exudyn_rows.version()}",
+        "setting": f"step {step:g} s",
+        "seconds": taken.cpu,
+        "error": float(np.linalg.norm(np.subtract(end, FORTY))),
+    }
+
+
+def exudyns_motions() -> list[dict[str, Any]]:
+    """An optional peer: `pip install exudyn`."""
+    if find_spec("exudyn") is None:
+        print("Exudyn is not installed and left out: pip install exudyn", file=sys.stderr)
+        return []
+    return [exudyns_motion(step) for step in (5e-3, 1e-3, 5e-4)]
 
 
 def _pair(i: int) -> list[str]:
@@ -271,8 +291,9 @@ def main() -> None:
     options = study.parser(__doc__).parse_args()
     machines = [of_machine(name) for name in MACHINES]
     rows = [of_row(n) for n in ROWS]
-    motions = [our_motion(tolerance) for tolerance in (1e-6, 1e-8, 1e-9)]
+    motions = [our_motion(tolerance) for tolerance in (1e-6, 1e-7, 1e-8, 1e-9)]
     motions += [their_motion(step) for step in (1e-2, 1e-3, 2e-4)]
+    motions += exudyns_motions()
     text = "\n\n".join(
         [
             "# Robots with loops",
@@ -306,7 +327,7 @@ def main() -> None:
                 {
                     "engine": lambda r: r["engine"],
                     "setting": lambda r: r["setting"],
-                    "s": lambda r: f"{r['seconds']:.2f}",
+                    "s of the processor": lambda r: f"{r['seconds']:.2f}",
                     "error [m]": lambda r: f"{r['error']:.0e}",
                 },
                 left=2,

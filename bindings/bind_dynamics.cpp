@@ -199,17 +199,21 @@ void bind_forward(nb::module_& m) {
       [](const PyModel& self, nb::handle q, nb::handle v, nb::handle tau, nb::handle external,
          bool passive, const std::string& method, const std::string& solver, nb::handle tolerance,
          nb::handle stop, nb::handle max_iterations, nb::handle solver_options, nb::handle threads,
-         bool full, double gravity, nb::handle prescribed, nb::handle loop_tau) {
+         bool full, double gravity, nb::handle prescribed, nb::handle loop_tau,
+         nb::handle loop_prescribed) {
         return forward_dynamics(
-            self, States(*self.model, q, v, tau, "tau", external, prescribed, loop_tau), passive,
-            gravity, options_of(method, solver, tolerance, stop, max_iterations, solver_options),
-            threads, full ? Wanted::full : Wanted::accelerations);
+            self,
+            States(*self.model, q, v, tau, "tau", external, prescribed, loop_tau, loop_prescribed),
+            passive, gravity,
+            options_of(method, solver, tolerance, stop, max_iterations, solver_options), threads,
+            full ? Wanted::full : Wanted::accelerations);
       },
       "model"_a, "q"_a, "v"_a.none(), "tau"_a = nb::none(), nb::kw_only(),
       "external"_a = nb::none(), "passive"_a = false, "method"_a = "auto", "solver"_a = "auto",
       "tolerance"_a = nb::none(), "stop"_a = nb::none(), "max_iterations"_a = nb::none(),
       "solver_options"_a = nb::none(), "threads"_a = nb::none(), "full"_a = false,
       "gravity"_a = 1.0, "prescribed"_a = nb::none(), "loop_tau"_a = nb::none(),
+      "loop_prescribed"_a = nb::none(),
       doc::text(
           "Accelerations that torques cause, by the method asked for.",
           {doc::q_v_tau, doc::external, doc::passive,
@@ -219,7 +223,7 @@ void bind_forward(nb::module_& m) {
     solver_options: further options by name, as in linkwise.solver_options(); they go first.
     full: return everything.
 )",
-           doc::gravity, doc::prescribed, doc::loop_tau},
+           doc::gravity, doc::prescribed, doc::loop_tau, doc::loop_prescribed},
           "    dv/dt (..., nv) [rad/s2, m/s2]; with full a ForwardDynamicsResult.",
           R"(a name is unknown, shapes do not fit the model, or a number is not finite.
     NumericsError: the method failed; not with full, whose report says so.)")

@@ -1,14 +1,54 @@
-// How far what loop joints join is apart, and their coordinates.
+// How far what loop joints join is apart, and their coordinates and accelerations.
 #include <algorithm>
 
 #include <nanobind/nanobind.h>
 
 #include "bind.hpp"
-#include "linkwise/kinematics/loop_states.hpp"
+#include "linkwise/dynamics/loop_rates.hpp"
 #include "report.hpp"
 #include "states.hpp"
 
 namespace linkwise::bindings {
+namespace {
+
+void bind_accelerations(nb::module_& m) {
+  m.def(
+      "loop_accelerations",
+      [](const PyModel& self, nb::handle q, nb::handle v, nb::handle a) {
+        const Model& model = *self.model;
+        const States s(model, q, v, a, "acceleration", nb::none());
+        NewArray out(s.lead, {size(model.loops.nv)});
+        const std::vector<double> rest(model.nv());
+        without_gil([&](const GoOn& go_on) {
+          LoopRates loops(model);
+          const auto row = [&](const Argument& x, size_t i) {
+            return x.given ? x.data + i * rest.size() : rest.data();
+          };
+          for (size_t i = 0; i < s.count && go_on(); ++i) {
+            const auto found =
+                loops.accelerations(s.q.data + i * size(model.nq()), row(s.v, i), row(s.tau, i));
+            std::copy(found.begin(), found.end(), out.data + i * found.size());
+          }
+        });
+        check_result(out.data, s.count * size(model.loops.nv));
+        return out.array;
+      },
+      "model"_a, "q"_a, "v"_a.none(), "acceleration"_a.none(),
+      R"(Accelerations (..., sum of loop joints' nv) [rad/s2, m/s2] of the joints that close loops: the
+derivatives of the rates of loop_coordinates. Those of the joints that Model.prescribe names are 0.
+
+Args:
+    model: the mechanism.
+    q: positions (..., nq) [rad, m].
+    v: rates (..., nv) [rad/s, m/s]; None: at rest.
+    acceleration: dv/dt (..., nv) [rad/s2, m/s2] of the joints of the tree; None: 0.
+
+Raises:
+    InputError: q, v or the accelerations have another shape.
+    NumericsError: a result is not finite.)");
+}
+
+}  // namespace
 
 void bind_loop_gaps(nb::module_& m) {
   m.def(
@@ -77,6 +117,7 @@ Args:
 
 Raises:
     InputError: q or v has another shape.)");
+  bind_accelerations(m);
 }
 
 }  // namespace linkwise::bindings

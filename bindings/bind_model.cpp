@@ -125,7 +125,7 @@ PyModel* with_joint_type(const PyModel& self, const std::string& joint, const st
 PyModel* prescribe(const PyModel& self, const std::vector<std::string>& names) {
   ModelSpec spec = self.model->spec();
   for (const std::string& name : names) {
-    self.model->joint_index(name);
+    self.model->load_index(name);
     spec.prescribed.push_back(name);
   }
   return new PyModel(std::move(spec));
@@ -399,14 +399,15 @@ void bind_variants(ModelClass& c) {
   c.def("prescribe", &prescribe, "joints"_a, nb::rv_policy::take_ownership,
         R"(The same machine with the motion of these joints given.
 
-forward_dynamics takes their accelerations (prescribed=) and finds those of the others, and the
-torque of the given motion is part of the joint load.
+forward_dynamics takes their accelerations (prescribed=, loop_prescribed=) and finds those of the
+others, and the torque of the given motion is part of the joint load. Joints that close loops stand
+and move as the tree's q and v make them.
 
 Args:
-    joints: names.
+    joints: names, of joints that close loops too.
 
 Raises:
-    InputError: a joint is unknown.)")
+    InputError: a joint is unknown, a rod or a spring.)")
       .def("with_payload", &payload_on, "link"_a, nb::kw_only(), "mass"_a, "com"_a = nb::none(),
            "inertia"_a = nb::none(), "name"_a = "payload", nb::rv_policy::take_ownership,
            R"(The same machine with a body welded to a link.

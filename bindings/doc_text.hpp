@@ -33,6 +33,10 @@ inline constexpr const char* gravity =
 inline constexpr const char* prescribed =
     R"(    prescribed: accelerations (..., nv) of the joints of Model.prescribe; the others are not read.
 )";
+inline constexpr const char* loop_prescribed =
+    R"(    loop_prescribed: accelerations (..., sum of their nv) of the joints that close loops, of which those of
+        Model.prescribe are read; None: zero.
+)";
 inline constexpr const char* frame = "    frame: a link's name, merged or not, or a Frame.\n";
 inline constexpr const char* threads =
     R"(    threads: how many share the states; None: LINKWISE_THREADS or all cores. No bit depends on it.

@@ -33,6 +33,7 @@ from linkwise._core import joint_loads_by_cause as joint_loads_by_cause
 from linkwise._core import joint_poses as joint_poses
 from linkwise._core import kinetic_energy as kinetic_energy
 from linkwise._core import link_poses as link_poses
+from linkwise._core import loop_accelerations as loop_accelerations
 from linkwise._core import loop_coordinates as loop_coordinates
 from linkwise._core import loop_gaps as loop_gaps
 from linkwise._core import mass_matrix as mass_matrix

@@ -17,6 +17,7 @@ from linkwise.base import Array
 from linkwise.drives import as_drive, as_wrench
 from linkwise.plot.charts import Dot, DotChart, dots_to_svg
 from linkwise.simulation.arguments import number
+from linkwise.simulation.assembling import assemble
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -110,6 +111,8 @@ def driven_trajectory(model: Model, arguments: Mapping[str, Any], states: int) -
     for body, wrench in (arguments.get("wrenches") or {}).items():
         as_wrench(wrench).apply(simulation, body)
     q0, v0 = arguments.get("q0"), arguments.get("v0")
+    loops = arguments.get("loop_position")
+    q0 = assemble(model, q0, hold=arguments.get("hold", ()), loop_position=loops).q if loops else q0
     return _record(
         simulation,
         model,

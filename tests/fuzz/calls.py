@@ -62,21 +62,22 @@ GOOD = {
 }
 # Each function with its arguments: `*` those that are always given.
 CALLS = {
-    "forward_dynamics": "*q *v tau:v loop_tau:loop_rates external:wrenches passive:flag method "
-    "solver tolerance stop max_iterations:count solver_options:options threads full:flag "
-    "gravity:number",
+    "forward_dynamics": "*q *v tau:v loop_tau:loop_rates loop_prescribed:loop_rates "
+    "external:wrenches passive:flag method solver tolerance stop max_iterations:count "
+    "solver_options:options threads full:flag gravity:number",
     "inverse_dynamics": "*q *v *acceleration:v external:wrenches driven:joints passive:flag "
     "full:flag gravity:number threads",
     "inverse_dynamics_loads": "*q *v *acceleration:v external:wrenches driven:joints passive:flag "
     "gravity:number threads",
     "joint_loads": "*q *v tau:v loop_tau:loop_rates external:wrenches passive:flag method solver "
     "threads",
-    "joint_loads_by_cause": "*causes *q *v tau:v loop_tau:loop_rates external:wrenches method "
-    "threads",
+    "joint_loads_by_cause": "*causes *q *v tau:v loop_tau:loop_rates "
+    "loop_prescribed:loop_rates external:wrenches method threads",
     "joint_poses": "*q threads",
     "link_poses": "*q threads",
     "loop_gaps": "*q",
     "loop_coordinates": "*q v",
+    "loop_accelerations": "*q *v *acceleration:v",
     "indeterminacy": "*q:state",
     "undecided_loads": "q:state",
     "assemble": "q0:state v0:rates",

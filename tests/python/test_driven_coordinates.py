@@ -215,6 +215,15 @@ def test_couplings_by_polynomials_tie_the_driven_coordinates(rng):
     assert tau[at[0]][0] == pytest.approx(want, rel=1e-13)
 
 
+def test_a_balance_to_rounding_is_one():
+    """Four-bars upright and moving: only rounding accelerates them, and no torque is needed."""
+    machine = lw.scenes.benchmark("four_bars")
+    a = lw.forward_dynamics(machine.model, machine.q0, machine.v0)
+    assert 0 < np.abs(a).max() < 1e-13
+    tau = lw.inverse_dynamics(machine.model, machine.q0, machine.v0, a, driven=["A0"])
+    np.testing.assert_allclose(tau, 0, atol=1e-12)
+
+
 def test_the_coordinates_of_a_tree_may_be_driven_too():
     model = lw.scenes.chain(4)
     q = np.linspace(0.1, 0.4, 4)

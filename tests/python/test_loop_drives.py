@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import linkwise as lw
+from helpers.looped_machines import chain, closed_rates
 
 Z = (0, 0, 1)
 CORNERS = {"a": (0.0, 0.0), "b": (0.3, 0.9), "c": (1.4, 1.1), "d": (1.2, 0.0)}
@@ -243,8 +244,121 @@ def test_shares_and_bounds_know_the_drives_where_the_loop_is_cut():
         np.testing.assert_allclose(second, first, atol=1e-5 * (1 + np.abs(first).max()))
 
 
-def test_what_does_not_take_given_motions_of_loop_joints_says_so():
-    motion = lw.Motion(lambda t: (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t)))
-    run = simulate_both({"c": motion})[0]
-    with pytest.raises(lw.InputError, match=r"joint 'c' closes a loop and its motion is given"):
-        lw.loads.split(run)
+SWING = lw.Motion(lambda t: (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t)))
+
+
+@pytest.mark.parametrize("drives", [{"c": SWING, "a": -2.0}, {"c": lw.Locked(), "d": 3.0}])
+def test_shares_and_bounds_of_given_motions_where_the_loop_is_cut(drives):
+    properties = {"c": {"armature": 0.7, "damping": 0.2}, "d": {"stiffness": 3.0}}
+    runs = simulate_both(drives, properties=properties, spin=0.0)
+    shares = [lw.loads.split(run) for run in runs]
+    assert ("motion" in shares[0].cause) == (drives["c"] is SWING)
+    for run, share in zip(runs, shares, strict=True):
+        total = share.sum("cause", skipna=False).values
+        np.testing.assert_allclose(total, run.joint_load.values, atol=1e-8 * np.abs(total).max())
+    for name in "abcd":  # of what is determined the shares are the same, wherever the loop is cut
+        first, second = (x.sel(joint=name).values[..., [0, 1, 5]] for x in shares)
+        np.testing.assert_allclose(second, first, atol=1e-5 * (1 + np.abs(first).max()))
+    tighter = simulate_both(drives, properties=properties, tolerance=1e-11)
+    bounds = [lw.loads.bounds(*pair) for pair in zip(runs, tighter, strict=True)]
+    for found in bounds:
+        assert np.isfinite(found.plus_minus.sel(quantity="radial").values).all()
+        assert found.algebraic.sel(quantity="radial").values.max() < 1e-9
+    peaks = [lw.loads.split_at_peaks(run) for run in runs]
+    for found in peaks:
+        np.testing.assert_allclose(found.share.sum("cause"), found.total, rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("kind", "axes"),
+    [
+        ("revolute", {"axis": Z}),
+        ("helical", {"axis": Z, "pitch": 0.2}),
+        ("cylindrical", {"axis": Z}),
+        ("universal", {"axes": [(1, 0, 0), (0, 1, 0)]}),
+        ("planar", {"axis": Z}),
+        ("spherical", {}),
+        ("spring", {}),
+    ],
+)
+def test_accelerations_of_loop_joints_are_the_derivatives_of_their_rates(kind, axes, rng):
+    while True:
+        _, tree, q, _ = chain(rng, [], 10)
+        inward = [tree.joint_parents[-1]]
+        while inward[-1] >= 0:
+            inward.append(tree.joint_parents[inward[-1]])
+        if len(inward) > 7:  # joints in the loop, so that it can move
+            break
+    end = lw.link_poses(tree, q)[tree.link_names.index("link9")]
+    place = {"translation": end[:3, 3], "rotation": end[:3, :3]}
+    if kind == "spring":
+        model = tree.with_spring("end", "base", "link9", length=1.0, stiffness=2.0, point=(1, 2, 3))
+    else:
+        model = tree.with_loop("end", kind, "base", "link9", **place, **axes)
+    v = lw.assemble(model, q, rng.normal(size=tree.nv)).v
+    a = lw.forward_dynamics(model, q, v, rng.normal(size=tree.nv))
+    step = 1e-5
+
+    def rates_at(t):
+        return lw.loop_coordinates(model, q + t * v + t * t / 2 * a, v + t * a)[1]
+
+    got = lw.loop_accelerations(model, q, v, a)
+    want = (rates_at(step) - rates_at(-step)) / (2 * step)
+    np.testing.assert_allclose(got, want, rtol=0, atol=1e-6 * (1 + np.abs(want).max()))
+    assert np.abs(want).max() > 0.1
+
+
+def test_prescribed_loop_joints_of_one_state(rng):
+    """Held by a given acceleration or by the torque that this takes, the machine moves alike."""
+    machine = chain(rng, [("revolute", "base", "link6")])
+    v = closed_rates(machine, rng)
+    tau = rng.normal(size=machine.model.nv)
+    held = machine.model.prescribe(["loop0"])
+    found = lw.forward_dynamics(held, machine.q, v, tau, loop_prescribed=[2.0], full=True)
+    torque = found.joint_load[-1, 5]  # about z, its axis
+    free = lw.forward_dynamics(machine.model, machine.q, v, tau, loop_tau=[torque], full=True)
+    size = np.abs(free.acceleration).max()
+    np.testing.assert_allclose(found.acceleration, free.acceleration, atol=1e-9 * size)
+    got = lw.loop_accelerations(machine.model, machine.q, v, free.acceleration)
+    assert got[0] == pytest.approx(2.0, abs=1e-9 * size)
+    with pytest.raises(lw.InputError, match="loop_prescribed: the model has no joint of given"):
+        lw.forward_dynamics(machine.model, machine.q, v, loop_prescribed=[2.0])
+
+
+@pytest.mark.parametrize("slider", [False, True])
+def test_starts_are_given_where_the_loop_is_cut(slider):
+    at = 0.1 if slider else 0.3
+    of_tree = four_bar("c", slider=slider)
+    q0 = np.where(np.array(of_tree.joint_names) == "d", at, 0.0)
+    options = {"duration": 0.3, "every": 0.1, "tolerance": 1e-10}
+    runs = [
+        lw.simulate(of_tree, q0=q0, hold=["d"], **options),
+        lw.simulate(four_bar("d", slider=slider), loop_position={"d": at}, **options),
+    ]
+    assert_same_runs(runs)
+    for run in runs:
+        assert of_joint(run, "position", "d")[0] == pytest.approx(at, abs=1e-10)
+    model = four_bar("d", slider=slider)
+    found = lw.assemble(model, None, [1.0, 0, 0], loop_position={"d": at})
+    assert lw.loop_coordinates(model, found.q)[0] == pytest.approx(at, abs=1e-10)
+    again = lw.assemble(model, found.q, [1.0, 0, 0])  # rates are those of the free machine
+    np.testing.assert_allclose(found.v, again.v, atol=1e-9)
+    assert np.abs(found.v).max() > 0.1
+
+
+def test_starts_where_the_loop_is_cut_that_cannot_be():
+    model = four_bar("d")
+    with pytest.raises(lw.InputError, match="'a' is no joint of one axis that closes a loop"):
+        lw.assemble(model, loop_position={"a": 0.1})
+    q0 = np.where(np.array(model.joint_names) == "a", 0.5, 0.0)
+    run = lw.simulate(model, duration=0.1, q0=q0, hold=["a"], loop_position={"d": 0.1})
+    (said,) = [w["text"] for w in run.warnings if w["element"] == "assembly"]
+    assert said.startswith("to start with d as given, joints were moved: 'a' by -0.3")
+    assert said.endswith("joints that were to be held had to move: a")
+    released = lw.assemble(model, q0, hold=["a"], loop_position={"d": 0.1}).released
+    assert released == ("a",)
+    far = four_bar("d", slider=True)
+    with pytest.raises(lw.InputError, match="'d'"):
+        lw.assemble(far, loop_position={"d": 50.0})
+    turned = [lw.assemble(model, loop_position={"d": x}).q for x in (0.1, 0.1 + 2 * np.pi)]
+    np.testing.assert_allclose(*turned, atol=1e-9)

@@ -172,7 +172,7 @@ def test_functions_of_states(name, machine):
 
 #: Functions of files, which the tests of files run with loops, and those that are made for loops.
 ELSEWHERE = {"load", "load_scenario", "open_run", "run_scenario", "sweep", "simulate"}
-ELSEWHERE |= {"driven_jacobian", "loop_coordinates"}
+ELSEWHERE |= {"driven_jacobian", "loop_accelerations", "loop_coordinates"}
 TABLES = {"initial_guesses", "integrators", "methods", "numerics", "quantities", "solver_options"}
 TABLES |= {"solvers", "stop_rules"}
 

@@ -31,6 +31,14 @@ if TYPE_CHECKING:
     from linkwise.loads.rating import Rating
     from linkwise.results import Run
 
+DrivenOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="With --split motion, of closed loops: a joint that drives the machine; may be "
+        "repeated. All that have drives in the run unless given.",
+    ),
+]
+
 _MOST_JOINTS = 40
 _SHOWN = ("force", "axial", "radial", "moment", "tilting_moment", "torque", "drive_power")
 
@@ -51,6 +59,7 @@ def loads(
             help="What each cause adds at the peaks: the acting forces, or what the motion needs.",
         ),
     ] = None,
+    driven: DrivenOption = None,
     ratings: Annotated[
         Path | None,
         typer.Option(
@@ -81,12 +90,11 @@ def loads(
     from linkwise.loads.samples import joint_position
     from linkwise.results import open_run
 
-    for written in (csv, html):
-        if written is not None:
-            check_file(written)
+    for written in filter(None, (csv, html)):
+        check_file(written)
     opened = open_run(run)
     if at is not None or point is not None:
-        if any((split, ratings, certify, html)) or at is None:
+        if any((split, driven, ratings, certify, html)) or at is None:
             raise InputError("--at: goes with --point, --joint, --csv, --model and --json alone")
         show_at(opened, machine_of(opened, model), at, point, joint, csv, as_json)
         return
@@ -99,7 +107,7 @@ def loads(
             )
         joint_position(opened, name)
     found = collect(opened, machine, rating_tables(opened, ratings), certify, as_json)
-    shares = peak_shares(opened, machine, split) if split else []
+    shares = peak_shares(opened, machine, split, driven) if split or driven else []
     records = peak_records(found, joint)
     if csv is not None:
         write_csv(records, csv)
@@ -249,16 +257,20 @@ def peak_records(found: dict[str, Any], joints: list[str] | None) -> list[dict[s
     return records
 
 
-def peak_shares(run: Run, model: Model, by: str) -> list[dict[str, Any]]:
+def peak_shares(
+    run: Run, model: Model, by: str | None, driven: list[str] | None = None
+) -> list[dict[str, Any]]:
     """What each cause adds to the peak force and moment, along them; the shares add up."""
     from linkwise._core import InputError
     from linkwise.base import HALVES
     from linkwise.io.complaint import shown
     from linkwise.loads.causes import CAUSES, split_at_peaks
 
+    if driven and by != "motion":
+        raise InputError("--driven: goes with --split motion")
     if by not in CAUSES:
-        raise InputError(f"--split: {shown(by)} is unknown; use force or motion")
-    found = split_at_peaks(run, by, model)  # type: ignore[arg-type]
+        raise InputError(f"--split: {shown(by or '')} is unknown; use force or motion")
+    found = split_at_peaks(run, by, model, driven=driven or None)  # type: ignore[arg-type]
     known = found["determinate"].values if "determinate" in found else None
     columns = {name: found[name].values for name in ("time", "total", "peak")}
     columns |= {str(name): found["share"].sel(cause=name).values for name in found["cause"].values}

@@ -20,6 +20,7 @@ from linkwise.loads.extremes import (
     what_samples_miss,
 )
 from linkwise.loads.members import each_member
+from linkwise.loads.motion_causes import DrivenMotion
 from linkwise.loads.peaks import peak_loads
 from linkwise.loads.samples import (
     drive_kinds,
@@ -56,6 +57,7 @@ CAUSES: dict[str, dict[str, str]] = {
         "gravity": "what holds the mechanism at rest against gravity",
         "velocity": "what the joints' rates need: centrifugal, Coriolis, gyroscopic",
         "acceleration": "what the joints' accelerations need",
+        "passive": "what balances damping, friction, springs and stops, in machines with loops",
         "external": "what balances the external wrenches",
     },
 }
@@ -67,36 +69,57 @@ _MISFITS = {"offset", "turn", "preload"}
 _PASSIVE = ("damping", "friction", "stiffness", "limit_stiffness")
 
 
+def _yields(model: Model) -> AnyArray:
+    """Degrees of freedom (nv,) of the tree with passive forces."""
+    found: AnyArray = np.any([model.dof_property(name) != 0 for name in _PASSIVE], axis=0)
+    return found
+
+
+def _loops_yield(model: Model) -> bool:
+    return any(np.any(model.loop_property(name)) for name in _PASSIVE)
+
+
 class Split:
     """Evaluates the shares of any block of samples of one run.
 
     At a given position the equations of motion are linear in gravity, the velocity terms, drives,
     external wrenches and passive forces, and what is factored of them depends on the position
-    alone: by force, one factorisation serves all causes. By motion nothing is to be solved.
+    alone: by force, one factorisation serves all causes. By motion nothing is to be solved in a
+    tree, and where loops close, the torques of the driven joints are.
     """
 
-    def __init__(self, run: RunLike, by: By, model: Model | None) -> None:
+    def __init__(
+        self, run: RunLike, by: By, model: Model | None, driven: Sequence[str] | None = None
+    ) -> None:
         check_one_of("by", by, CAUSES)
         self.run, self.by = run, by
         machine = model_of(run, model)
         self.closed = bool(machine.n_loops or machine.coupling_names)
-        if by == "motion" and self.closed:
+        if driven is not None and not (by == "motion" and self.closed):
             raise InputError(
-                "by: how loads of closed loops split by motion depends on what drives them; "
-                'split them by "force"'
+                "driven: is for loads by motion of machines with closed loops; leave it out"
             )
         wanted = ["joint_load", "position", "velocity"]
         wanted += ["drive_torque"] if by == "force" else ["acceleration"]
-        self.given = given_motions(run, machine)
+        self.given = given_motions(run)
         if by == "force" and self.given:
             wanted.append("acceleration")
         need_whole(run, machine, *wanted)
         self.model = machine
+        moved = by == "motion" and self.closed
+        self._driven = DrivenMotion(run, machine, driven) if moved else None
         held = by == "force" and self.given
         self.free = machine.prescribe(list(self.given)) if held else machine
         self.imposed = np.zeros(machine.nv, dtype=bool)
+        self.loop_imposed = np.zeros(sum(machine.loop_nv), dtype=bool)
+        rates = {
+            name: v for name, (_, v) in zip(machine.loop_names, machine.loop_slices, strict=True)
+        }
         for joint in self.given:
-            self.imposed[machine.v_slice(joint)] = True
+            if joint in rates:
+                self.loop_imposed[rates[joint]] = True
+            else:
+                self.imposed[machine.v_slice(joint)] = True
         self.names = [name for name in CAUSES[by] if self._happens(name)]
 
     def _happens(self, cause: str) -> bool:
@@ -108,11 +131,13 @@ class Split:
         if cause == "drive":
             kinds = drive_kinds(self.run)
             return kinds is None or not set(kinds.values()) <= {"free", "locked", "motion"}
+        if cause == "passive" and self.by == "motion":
+            return self.closed and bool(_yields(self.model).any() or _loops_yield(self.model))
         if cause == "passive":
             free = ~self.imposed
-            if any(self.model.loop_property(name).any() for name in _PASSIVE):
+            if _loops_yield(self.model):
                 return True
-            return any(self.model.dof_property(name)[free].any() for name in _PASSIVE)
+            return bool(_yields(self.model)[free].any())
         if cause == "misfit":
             given = self.model.bearings.values() if self.closed else ()
             return any(_MISFITS & bearing.keys() for bearing in given)
@@ -192,7 +217,13 @@ class Split:
             assert torque is not None
             driven = np.where(self.imposed, 0.0, torque)
             held = a if "motion" in self.names else None
-            return self._by_force(q, [v, driven, outside, held, loops])
+            of_loops = None if held is None else self._of_loops(q, v, held)
+            if loops is not None:
+                loops = np.where(self.loop_imposed, 0.0, loops)
+            return self._by_force(q, [v, driven, outside, held, loops, of_loops])
+        if self._driven is not None:
+            assert a is not None
+            return self._driven.shares(self.names, q, v, a, outside)
         shares = np.empty((len(q), len(self.names), self.model.n_joints, 6))
         for k, cause in enumerate(self.names):
             shares[:, k] = _core.inverse_dynamics_loads(
@@ -205,9 +236,13 @@ class Split:
             )
         return shares
 
+    def _of_loops(self, q: Array, v: Array, a: Array) -> Array | None:
+        """Accelerations of the joints that close loops."""
+        return _core.loop_accelerations(self.model, q, v, a) if self.loop_imposed.any() else None
+
     def _by_force(self, q: Array, acting: Sequence[Array | None]) -> Array:
         """Of closed loops NaN at each state that is in a singular position."""
-        v, driven, outside, held, loops = acting
+        v, driven, outside, held, loops, of_loops = acting
         try:
             return _core.joint_loads_by_cause(
                 self.free,
@@ -218,6 +253,7 @@ class Split:
                 external=outside,
                 prescribed=held,
                 loop_tau=loops,
+                loop_prescribed=of_loops,
             )
         except NumericsError:
             if not self.closed:
@@ -232,7 +268,13 @@ class Split:
 
 
 @each_member
-def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.DataArray:
+def split(
+    run: RunLike,
+    by: By = "force",
+    model: Model | None = None,
+    *,
+    driven: Sequence[str] | None = None,
+) -> xr.DataArray:
     """Joint loads by cause; the shares add up to the joint load to rounding.
 
     Args:
@@ -241,8 +283,12 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
             `drive_torque`.
         by: "force": what each acting force alone would load the joints with while the mechanism
             moves freely under it (joints whose motion is given stay held). "motion": what the
-            position, the rates and the accelerations of this very motion each need.
+            position, the rates and the accelerations of this very motion each need. Where loops
+            close that depends on the joints whose drives make it: the rates are then those
+            that go on while the driven joints keep theirs.
         model: The machine, if the run does not hold it.
+        driven: By motion, where loops close: names of the joints that make the motion; those with
+            drives in the run unless given.
 
     Returns:
         DataArray (time, cause, joint, component), frame and signs as `joint_load`. Causes that the
@@ -254,7 +300,7 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
     """
     import xarray as xr
 
-    made = Split(run, by, model)
+    made = Split(run, by, model, driven)
     given = run.dataset["joint_load"]
     about = {f"cause {name}": CAUSES[by][name] for name in made.names}
     return xr.DataArray(
@@ -279,11 +325,17 @@ def split(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Data
 
 
 @each_member
-def split_at_peaks(run: RunLike, by: By = "force", model: Model | None = None) -> xr.Dataset:
+def split_at_peaks(
+    run: RunLike,
+    by: By = "force",
+    model: Model | None = None,
+    *,
+    driven: Sequence[str] | None = None,
+) -> xr.Dataset:
     """What each cause adds to the largest force and the largest moment of every joint.
 
     Args:
-        run, by, model: As for `split`.
+        run, by, model, driven: As for `split`.
 
     Returns:
         Dataset over (quantity, joint): `share` (cause, quantity, joint), its part along the load at
@@ -297,7 +349,7 @@ def split_at_peaks(run: RunLike, by: By = "force", model: Model | None = None) -
     """
     import xarray as xr
 
-    made = Split(run, by, model)
+    made = Split(run, by, model, driven)
     peaks = peak_loads(run)
     times = run.dataset["time"].values
     names, shape = joint_names(run), (len(HALVES), len(joint_names(run)))

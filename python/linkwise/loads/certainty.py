@@ -58,12 +58,13 @@ def refined_loads(run: RunLike, model: Model, where: slice) -> Array:
     q, v = rows(run, "position", where), rows(run, "velocity", where)
     a = rows(run, "acceleration", where)
     outside = external(run, model, where)
-    given = list(given_motions(run, model))
+    given = list(given_motions(run))
     free = model.prescribe(given) if given else model
     if model.n_loops or model.coupling_names:
+        held = (a, _core.loop_accelerations(model, q, v, a)) if given else (None, None)
         return _solved_again(
             free,
-            (q, v, a if given else None),
+            (q, v, *held),
             (rows(run, "drive_torque", where), loop_torque(run, where)),
             outside,
         )
@@ -78,12 +79,12 @@ def refined_loads(run: RunLike, model: Model, where: slice) -> Array:
 
 def _solved_again(
     free: Model,
-    motion: tuple[Array, Array, Array | None],
+    motion: tuple[Array, Array, Array | None, Array | None],
     torques: tuple[Array, Array | None],
     outside: Array | None,
 ) -> Array:
     """Loads of closed loops, of the recorded states: nothing iterates in their elimination."""
-    q, v, a = motion
+    q, v, a, of_loops = motion
     tau, loop_tau = torques
     solved = _core.forward_dynamics(
         free,
@@ -95,6 +96,7 @@ def _solved_again(
         full=True,
         prescribed=a,
         loop_tau=loop_tau,
+        loop_prescribed=of_loops,
     )
     if solved.report.outcome != "converged":  # in a singular position: not known
         return np.full(solved.joint_load.shape, np.nan)

@@ -59,25 +59,12 @@ class Held:
     """A machine some of whose joints are locked or moved as given, and so hold a direction more."""
 
     def __init__(self, model: Model, joints: Iterable[str]) -> None:
-        names = set(joints)
-        of_tree = [name for name in model.joint_names if name in names]
-        self._model = model.prescribe(of_tree) if of_tree else model
-        self._loops = [k for k, name in enumerate(model.loop_names) if name in names]
+        names = list(joints)
+        self._model = model.prescribe(names) if names else model
 
     def indeterminacy(self, q: Array) -> Indeterminacy:
         """Raises InputError where the position q (nq,) [rad, m] leaves loops open."""
-        model = self._model
-        # Joints that close loops cannot be prescribed: a coupling holds each where it is.
-        if self._loops:
-            there = np.asarray(_core.loop_coordinates(model, q)[0])
-        for k in self._loops:
-            name = model.loop_names[k]
-            free = f"hold {name}"
-            while free in model.coupling_names:
-                free += "_"
-            offset = float(there[model.loop_slices[k][0]][0])
-            model = model.with_coupling(free, {name: 1.0}, offset=offset)
-        return _core.indeterminacy(model, q)
+        return _core.indeterminacy(self._model, q)
 
 
 def given_joints(run: RunLike) -> list[str]:

@@ -242,19 +242,10 @@ def drive_kinds(run: RunLike) -> dict[str, str] | None:
     return {joint: str(drive.get("kind")) for joint, drive in drives.items()}
 
 
-def given_motions(run: RunLike, model: Model) -> dict[str, str]:
-    """The joints of the tree whose motion was given, "locked" or "motion".
-
-    Raises InputError where that of a joint that closes a loop was given.
-    """
+def given_motions(run: RunLike) -> dict[str, str]:
+    """The joints whose motion was given, those that close loops too: "locked" or "motion"."""
     kinds = drive_kinds(run) or {}
-    given = {joint: kind for joint, kind in kinds.items() if kind in ("locked", "motion")}
-    for joint in given.keys() & set(model.loop_names):
-        raise InputError(
-            f"joint {joint!r} closes a loop and its motion is given: loads are not evaluated again "
-            "for such a run; let another joint close the loop"
-        )
-    return given
+    return {joint: kind for joint, kind in kinds.items() if kind in ("locked", "motion")}
 
 
 def loop_torque(run: RunLike, where: slice | Sequence[int]) -> Array | None:

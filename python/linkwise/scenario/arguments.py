@@ -139,6 +139,8 @@ class ArgumentBuilder:
         else:
             state = np.array(model.initial_configuration()) if position else np.zeros(model.nv)
         for joint, values in given.items():
+            if position and joint in self.loop_names:  # see loop_positions()
+                continue
             keys = ("initial", key, joint)
             self._check_joint(joint, keys)
             units = self._units(joint, keys, positions=position)
@@ -147,6 +149,31 @@ class ArgumentBuilder:
                 numbers[-4:] = self._quaternion(numbers[-4:], keys)
             state[model.q_slice(joint) if position else model.v_slice(joint)] = numbers
         return state
+
+    def held(self) -> dict[str, Any]:
+        """Which joints the start of a run leaves where they are, and where loop joints are then."""
+        hold = [
+            joint for joint in self.source.settings.initial.position if joint in self.joint_names
+        ]
+        loops = self.loop_positions()
+        return ({"hold": hold} if hold else {}) | ({"loop_position": loops} if loops else {})
+
+    def loop_positions(self) -> dict[str, float]:
+        """Where joints that close loops start [rad, m]."""
+        found = {}
+        for joint, values in self.source.settings.initial.position.items():
+            if joint not in self.loop_names:
+                continue
+            keys = ("initial", "position", joint)
+            units = self._units(joint, keys, positions=True)
+            if len(units) != 1:
+                self.source.complain(
+                    keys,
+                    f"joint '{shorten(joint)}' closes a loop and has several axes",
+                    "give positions of joints of the tree",
+                )
+            found[joint] = float(self._fit(values, units, keys, _KINDS["position"])[0])
+        return found
 
     def _keyframe(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]] | None:
         """q and v of the keyframe that the file names, or None."""

@@ -104,7 +104,7 @@ class Scenario(ScenarioSource):
             "wrenches": builder.wrenches(),
             "q0": builder.state("position"),
             "v0": builder.state("velocity"),
-            **({"hold": held} if (held := list(self.settings.initial.position)) else {}),
+            **builder.held(),
             "every": output.every,
             "record": {
                 "quantities": builder.quantities(),

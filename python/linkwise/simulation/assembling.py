@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,10 +13,15 @@ from linkwise import _core
 from linkwise._core import InputError
 from linkwise.base import Array
 from linkwise.io.complaint import shown
+from linkwise.notes import Ignored
 from linkwise.simulation.arguments import state_vector
 
 if TYPE_CHECKING:
     from linkwise._core import Model
+
+
+#: As of what the start of a run tells [rad, m].
+_WORTH_TELLING = 1e-9
 
 
 class Assembly(NamedTuple):
@@ -42,6 +48,7 @@ def assemble(
     v0: npt.ArrayLike | None = None,
     *,
     hold: Sequence[str] = (),
+    loop_position: Mapping[str, float] | None = None,
 ) -> Assembly:
     """The position near `q0` that closes all loops, and rates near `v0` that keep them closed.
 
@@ -51,6 +58,8 @@ def assemble(
         v0: Rates (nv,); zero by default.
         hold: Names of joints that are to stay where `q0` has them, with the rates of `v0`. Where
             loops do not close so, they are released, the last one first; see `released`.
+        loop_position: By name where joints of one axis that close loops are to stand [rad, m], such
+            as the length of a cylinder; the joints of the tree follow.
 
     Positions change as little as they can in the metric of the mass matrix, step by step, and rates
     by the least kinetic energy.
@@ -59,10 +68,58 @@ def assemble(
         InputError: no position was found; the message says which loop stays open by how much. Or
             the rates of held joints contradict each other.
     """
-    found = _core.assemble(
-        model,
-        state_vector("q0", q0, model.nq, model.initial_configuration()),
-        state_vector("v0", v0, model.nv, np.zeros(model.nv)),
-        held_joints(hold),
-    )
-    return Assembly(found["q"], found["v"], found["gap"], tuple(found["released"]))
+    q = state_vector("q0", q0, model.nq, model.initial_configuration())
+    v = state_vector("v0", v0, model.nv, np.zeros(model.nv))
+    held = held_joints(hold)
+    if not loop_position:
+        found = _core.assemble(model, q, v, held)
+        return Assembly(found["q"], found["v"], found["gap"], tuple(found["released"]))
+    there = _core.assemble(_with_loops_at(model, loop_position), q, np.zeros(model.nv), held)
+    found = _core.assemble(model, there["q"], v, [j for j in held if j not in there["released"]])
+    return Assembly(found["q"], found["v"], there["gap"], tuple(there["released"]))
+
+
+def at_loop_positions(
+    model: Model,
+    start: tuple[Array, Array],
+    hold: Sequence[str],
+    loop_position: Mapping[str, float] | None,
+) -> tuple[tuple[Array, Array], list[str], list[Ignored]]:
+    """The start that has loop joints there, the joints that it can hold, and what moved."""
+    held = held_joints(hold)
+    if not loop_position:
+        return start, held, []
+    found = assemble(model, start[0], hold=held, loop_position=loop_position)
+    way = found.q - start[0]
+    ways = {name: way[model.q_slice(name)] for name in model.joint_names}
+    moved = [
+        f"{name!r} by {float(own[np.abs(own).argmax()]):.3g}"
+        for name, own in ways.items()
+        if np.abs(own).max(initial=0.0) > _WORTH_TELLING
+    ]
+    text = f"to start with {', '.join(loop_position)} as given, joints were moved: "
+    text += ", ".join(moved)
+    if found.released:
+        text += f"; joints that were to be held had to move: {', '.join(found.released)}"
+    still = [name for name in held if name not in found.released]
+    return (found.q, start[1]), still, [Ignored("", "assembly", text)] if moved else []
+
+
+def _with_loops_at(model: Model, positions: Mapping[str, float]) -> Model:
+    """The machine with couplings that hold joints which close loops where they are to stand."""
+    kinds = dict(zip(model.loop_names, model.loop_types, strict=True))
+    freedoms = dict(zip(model.loop_names, model.loop_nv, strict=True))
+    for joint, value in positions.items():
+        if freedoms.get(joint) != 1 or kinds[joint] == "spring":
+            raise InputError(
+                f"loop_position: {shown(joint)} is no joint of one axis that closes a loop; "
+                "positions of joints of the tree stand in q0"
+            )
+        name = joint
+        while name in model.coupling_names:
+            name += "_"
+        at = float(value)
+        if kinds[joint] == "revolute":  # whose angle is within half a turn of zero
+            at = math.remainder(at, 2 * math.pi)
+        model = model.with_coupling(name, {joint: 1.0}, offset=at)
+    return model

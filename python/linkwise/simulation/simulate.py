@@ -34,7 +34,7 @@ from linkwise.simulation.arguments import (
     sample_times,
     state_vector,
 )
-from linkwise.simulation.assembling import held_joints
+from linkwise.simulation.assembling import at_loop_positions
 from linkwise.simulation.determinacy import Determinacy, is_looked_at, not_looked_at
 from linkwise.simulation.numerics import DEFAULTS, Numerics
 from linkwise.simulation.recording import Recording
@@ -390,6 +390,7 @@ def simulate(
     numerics: Numerics | Mapping[str, Any] | None = None,
     threads: int | None = None,
     hold: Sequence[str] = (),
+    loop_position: Mapping[str, float] | None = None,
     record: Recording | Mapping[str, Any] | Collection[str] | None = None,
     output: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
@@ -420,6 +421,8 @@ def simulate(
             dictionary. `linkwise.numerics()` lists all with their defaults.
         hold: Joints that closing the loops of the start leaves where `q0` has them; where loops do
             not close so, they are released, the last one first, and `run.warnings` says so.
+        loop_position: By name where joints of one axis that close loops start [rad, m], such as
+            the length of a cylinder; the joints of the tree follow; `run.warnings` says how far.
         threads: Worker threads; the results do not depend on it.
         record: Names of the quantities to record, such as `["joint_load", "position"]`, or a
             `Recording`, which also picks joints; everything by default.
@@ -443,7 +446,7 @@ def simulate(
     not determine (`run.determinate`), and an iterative solver whose errors are not bounded.
     """
     sampled = sample_times(duration, every, times)
-    start = _start(model, q0, v0)
+    start, hold, brought = at_loop_positions(model, _start(model, q0, v0), hold, loop_position)
     by_joint, by_name = check_driven(model, drives, wrenches)
     recording = Recording.of(record, options)
     chosen = options_object("numerics", Numerics, numerics, options)
@@ -469,7 +472,7 @@ def simulate(
     notes = set_driven(simulation, model, by_joint, by_name, float(sampled[-1]), start)
     if schema.extremes:
         simulation.keep_extremes(joint_directions(model))
-    simulation.start(0.0, *start, hold=held_joints(hold))
+    simulation.start(0.0, *start, hold=hold)
     attrs = provenance(
         model,
         options={
@@ -484,7 +487,7 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_name)
-    notes += _of_loops(simulation, model, schema)
+    notes += [*brought, *_of_loops(simulation, model, schema)]
     looked = model, by_joint, simulation.start_position, sampled.size
     determinacy = Determinacy(*looked) if schema.marks else None
     ignored = [*notes, *_coarse_solver(simulation, options), *warnings_of(model)]

@@ -93,6 +93,7 @@ SweepInput<double> AppliedStates::row(size_t i, bool loops_later) {
   in.tau = row.tau;
   in.external = row.external;
   in.prescribed = row.prescribed;
+  in.loop_du = row.loop_prescribed;
   in.gravity_factor = row.gravity_factor;
   if (loops_) loops_->add(i, row.loop_tau, in, loops_later);
   return in;

@@ -228,6 +228,7 @@ BatchInput BatchInput::from(const Model& model, size_t first) const {
   BatchInput part = *this;
   part.q = rows(q, model.nq());
   part.loop_tau = rows(loop_tau, model.loops.nv);
+  part.loop_prescribed = rows(loop_prescribed, model.loops.nv);
   part.external = rows(external, 6 * static_cast<size_t>(model.n_joints()));
   for (const double** row : {&part.v, &part.tau, &part.du, &part.prescribed, &part.passive})
     *row = rows(*row, nv);

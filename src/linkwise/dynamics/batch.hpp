@@ -16,8 +16,9 @@ struct BatchInput {
   const double* du = nullptr;   ///< inverse dynamics: accelerations of the motion
   /// Forward dynamics: accelerations of prescribed degrees of freedom, [nv]; null: zero.
   const double* prescribed = nullptr;
-  const double* loop_tau = nullptr;  ///< torques of loop joints; null: none
-  const double* external = nullptr;  ///< [n_joints][6] per system
+  const double* loop_tau = nullptr;         ///< torques of loop joints; null: none
+  const double* loop_prescribed = nullptr;  ///< accelerations of prescribed loop joints; null: zero
+  const double* external = nullptr;         ///< [n_joints][6] per system
   double gravity_factor = 1;
   const double* passive = nullptr;  ///< loads by cause: the part of the torques that is no drive's
   bool passive_acts = false;        ///< Evaluator: the model's passive forces act beside tau

@@ -11,6 +11,8 @@ namespace {
 
 /// Accelerations that differ by less than this part, by the roots of their energies, are the same.
 constexpr double same = 1e-6;
+/// Of what the open tree would do.
+constexpr double rounding = 1e-12;
 /// Part of what a degree of freedom of the open tree yields to its torque, below which the others
 /// hold it. At a distance d from a dead centre it is d^2.
 constexpr double held = 1e-10;
@@ -97,11 +99,19 @@ std::string DrivenInverse::name_of(const Dof& dof) const {
   return "";
 }
 
+/// By how much, as the root of its energy, accelerations may differ that count as the same. Where
+/// loops balance what acts, a and a_0 are the rounding of what the open tree would do.
+double DrivenInverse::calc_allowed(const SweepInput<double>& in, const double* a) {
+  const double closed = std::sqrt(energy(in.q, a)) + std::sqrt(energy(in.q, a0_.data()));
+  if (!open_.evaluate(in, du_.data(), nullptr)) return same * closed;
+  return same * closed + rounding * std::sqrt(energy(in.q, du_.data()));
+}
+
 /// Torques H (a - a_0) of the open tree beside those that make a_0 give a, if and only if a keeps
 /// the loops closed: then no force of a loop has to change. Otherwise the loops turn them into the
 /// nearest accelerations that do.
 DynamicsReport DrivenInverse::require_closed(const SweepInput<double>& in, const double* a,
-                                             double size, const std::string& where) {
+                                             double allowed, const std::string& where) {
   for (int i = 0; i < model_.nv(); ++i) miss_[i] = a[i] - a0_[i];
   SweepInput<double> still;
   still.q = in.q;
@@ -114,7 +124,7 @@ DynamicsReport DrivenInverse::require_closed(const SweepInput<double>& in, const
   const DynamicsReport report = forward(with, du_.data());
   if (!report.ok()) return report;
   for (int i = 0; i < model_.nv(); ++i) miss_[i] = du_[i] - a[i];
-  if (std::sqrt(energy(in.q, miss_.data())) > same * size)
+  if (std::sqrt(energy(in.q, miss_.data())) > allowed)
     throw InputError(where +
                      "accelerations open the loops; the nearest that keep them closed move " +
                      largest(du_.data(), a));
@@ -208,8 +218,8 @@ DynamicsReport DrivenInverse::evaluate(const SweepInput<double>& in, const doubl
   std::copy_n(in.loop_tau ? in.loop_tau : loop_rest_.data(), model_.loops.nv, loop_beside_.begin());
   DynamicsReport report = forward(in, a0_.data());
   if (!report.ok()) return report;
-  const double size = std::sqrt(energy(in.q, a)) + std::sqrt(energy(in.q, a0_.data()));
-  if (report = require_closed(in, a, size, where); !report.ok()) return report;
+  const double allowed = calc_allowed(in, a);
+  if (report = require_closed(in, a, allowed, where); !report.ok()) return report;
   if (report = factor(in.q, where); !report.ok()) return report;
   std::vector<double> drives(model_.nv()), loop_drives(model_.loops.nv), x(n);
   std::vector<double> total = beside_, loop_total = loop_beside_;
@@ -233,7 +243,7 @@ DynamicsReport DrivenInverse::evaluate(const SweepInput<double>& in, const doubl
     if (report = forward(driven, du_.data(), out.loads); !report.ok()) return report;
   }
   for (int i = 0; i < model_.nv(); ++i) miss_[i] = du_[i] - a[i];
-  if (std::sqrt(energy(in.q, miss_.data())) > same * size)
+  if (std::sqrt(energy(in.q, miss_.data())) > allowed)
     throw InputError(where + "driven: these joints do not make this motion; with them " +
                      largest(du_.data(), a) + "; drive more or other joints");
   if (out.tau) std::copy(drives.begin(), drives.end(), out.tau);

@@ -57,7 +57,8 @@ class DrivenInverse {
   void add_driven(const std::string& name);
   DynamicsReport forward(const SweepInput<double>& in, double* du, double* loads = nullptr);
   double energy(const double* q, const double* a);
-  DynamicsReport require_closed(const SweepInput<double>& in, const double* a, double size,
+  double calc_allowed(const SweepInput<double>& in, const double* a);
+  DynamicsReport require_closed(const SweepInput<double>& in, const double* a, double allowed,
                                 const std::string& where);
   void read_driven(const double* q, const double* du, double* x);
   double alone(const double* q, const Dof& dof);

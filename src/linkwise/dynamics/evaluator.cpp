@@ -26,9 +26,9 @@ constexpr CauseEntry causes[] = {{"gravity", Cause::gravity}, {"velocity", Cause
                                  {"misfit", Cause::misfit}};
 
 void check_prescribed(const Model& m, const BatchInput& s) {
-  if (s.prescribed && m.spec().prescribed.empty())
-    throw InputError(
-        "prescribed: the model has no joint of given motion; use model.prescribe([...])");
+  if ((s.prescribed || s.loop_prescribed) && m.spec().prescribed.empty())
+    throw InputError(std::string(s.prescribed ? "prescribed" : "loop_prescribed") +
+                     ": the model has no joint of given motion; use model.prescribe([...])");
 }
 
 /// Room for the results, which are still to be written, and for torques that are not given.
@@ -124,6 +124,7 @@ void each_cause_alone(const Model& m, DynamicsMethod& method, size_t count,
       if (cause == Cause::drive) in.loop_tau = all.loop_tau;
       if (cause == Cause::passive) in.loop_tau = yielding.loop_tau;
       if (cause == Cause::motion) in.prescribed = all.prescribed;
+      if (cause == Cause::motion) in.loop_du = all.loop_du;
       if (cause == Cause::external) in.external = all.external;
       in.gravity_factor = cause == Cause::gravity ? all.gravity_factor : 0;
       in.misfit_factor = cause == Cause::misfit ? 1 : 0;

@@ -14,6 +14,7 @@ LoopRates::LoopRates(const Model& model)
       external_(6 * static_cast<size_t>(model.n_joints())),
       torque_(model.nv()),
       tau_l_(model.loops.nv),
+      du_l_(model.loops.nv),
       x_(model.nv()),
       y_(model.nv()) {
   for (int j = 0; j < model.n_joints(); ++j)
@@ -26,6 +27,28 @@ std::span<const double> LoopRates::rates(const double* q, const double* u) {
   in.v = u;
   states_.update(in);
   return states_.v();
+}
+
+/// u_l' = P^+ (X_F a_b - X_FA a_a - c).
+std::span<const double> LoopRates::accelerations(const double* q, const double* u,
+                                                 const double* du) {
+  rates(q, u);
+  SweepInput<double> in;
+  in.q = q;
+  in.v = u;
+  in.gravity_factor = 0;
+  tree_.evaluate(in, du, nullptr, nullptr);
+  const auto of = [&](int body) { return body < 0 ? Motion<double>{} : tree_.acceleration(body); };
+  for (int l = 0; l < model_.n_loops(); ++l) {
+    const LoopJoint& loop = model_.loops.joints[l];
+    const LoopState& state = states_[l];
+    const Vector6<double> b = to_array(loop.on_child * of(loop.joint.body)),
+                          a = to_array(state.X_FA * of(loop.parent_body));
+    Vector6<double> left;
+    for (int i = 0; i < 6; ++i) left[i] = b[i] - a[i] - state.c[i];
+    for (int k = 0; k < state.basis.n; ++k) du_l_[state.dof[k]] = along(state.basis.dual[k], left);
+  }
+  return du_l_;
 }
 
 /// Wrenches on the two bodies of each loop joint, carried inward by the tree at rest.

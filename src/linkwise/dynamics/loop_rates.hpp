@@ -17,6 +17,8 @@ class LoopRates {
 
   /// R u of all loop joints [nv of theirs], 0 of those of given motion. u [nv] of the tree.
   std::span<const double> rates(const double* q, const double* u);
+  /// Accelerations of all loop joints [nv of theirs] that du [nv] of the tree at rates u makes.
+  std::span<const double> accelerations(const double* q, const double* u, const double* du);
   /// torque [nv] += R^T tau_l, tau_l [nv of loop joints], at the q of the last rates().
   void add_torques(const double* q, const double* tau_l, double* torque);
 
@@ -33,7 +35,7 @@ class LoopRates {
   LoopStates states_;
   InverseDynamics<double> tree_;
   std::vector<int> frame_;  ///< by body: the user's joint whose frame takes wrenches on it
-  std::vector<double> external_, torque_, tau_l_, x_, y_;
+  std::vector<double> external_, torque_, tau_l_, du_l_, x_, y_;
 };
 
 }  // namespace linkwise

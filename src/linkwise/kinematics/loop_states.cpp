@@ -88,15 +88,17 @@ LoopStates::LoopStates(const Model& model)
       q_(model.loops.nq),
       v_(model.loops.nv),
       given_v_(model.loops.nv),
-      given_du_(model.loops.nv) {
+      given_du_(model.loops.nv),
+      free_(model.loops.elements) {
   for (int l = 0; l < model.n_loops(); ++l) {
     const LoopJoint& loop = model.loops.joints[l];
     paths_.push_back(loop_path(model, loop));
     loops_[l].length = length_of(model, loop, paths_[l]);
   }
-  for (const Element& e : model.loops.elements) {
+  for (Element& e : free_) {
     if (const int own = info_of(e.kind).quaternion; own >= 0) start_[e.q + own + 3] = 1;
     any_given_ |= e.prescribed;
+    e.prescribed = false;
   }
 }
 
@@ -122,6 +124,7 @@ void LoopStates::update(const SweepInput<double>& in, const LoopEnds* ends) {
 void LoopStates::begin(const SweepInput<double>& in) {
   std::copy_n(in.loop_q ? in.loop_q : start_.data(), q_.size(), q_.begin());
   if (any_given_) place_given(in);
+  follows_tree_ = any_given_ && !in.loop_q;
 }
 
 void LoopStates::place_given(const SweepInput<double>& in) {
@@ -132,6 +135,23 @@ void LoopStates::place_given(const SweepInput<double>& in) {
       given_du_[i] = in.loop_du ? in.loop_du[i] : 0;
     }
   }
+}
+
+void LoopStates::follow_tree(int l, const Transform<double>& X_FE,
+                             const Vector6<double>& relative) {
+  const JointInfo& joint = model_.loops.joints[l].joint;
+  const std::span<const Element> stack(free_.data() + joint.first_element,
+                                       static_cast<size_t>(joint.n_elements));
+  closure_coordinates(stack, X_FE, q_.data());
+  SweepInput<double> at;
+  at.q = q_.data();
+  BodyState<double> state;
+  GeneralState<double> columns;
+  calc_general_state(stack, at, Motion<double>{}, state, columns);
+  ClosureBasis basis;
+  calc_closure_basis(columns.P, columns.n, basis);
+  for (int i = 0; i < columns.n; ++i)
+    given_v_[columns.dof[i]] = linkwise::along(basis.dual[i], relative);
 }
 
 void LoopStates::update_loop(bool moving, int l, const LoopEnds& ends) {
@@ -156,6 +176,10 @@ void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
   const LoopJoint& loop = model_.loops.joints[l];
   LoopState& out = loops_[l];
   const std::span<const Element> stack = stack_of(model_, loop);
+  const Vector6<double> a = to_array(of_a), b = to_array(of_b);
+  Vector6<double> relative;
+  for (int i = 0; i < 6; ++i) relative[i] = b[i] - a[i];
+  if (follows_tree_ && stack[0].prescribed) follow_tree(l, X_FE, relative);
   closure_coordinates(stack, X_FE, q_.data());
 
   // The elements once with given rates alone, for P, then with all, for c.
@@ -169,9 +193,8 @@ void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
   std::copy_n(columns.dof, columns.n, out.dof);
   closure_residual(out.basis, closure_gap(state.X, X_FE), out.gap);
 
-  const Vector6<double> a = to_array(of_a), b = to_array(of_b), given = to_array(state.v);
-  Vector6<double> relative;
-  for (int i = 0; i < 6; ++i) relative[i] = b[i] - a[i] - given[i];
+  const Vector6<double> given = to_array(state.v);
+  for (int i = 0; i < 6; ++i) relative[i] -= given[i];
   for (const Element& e : stack)
     for (int i = e.v; e.prescribed && i < e.v + e.nv; ++i) v_[i] = given_v_[i];
   for (int i = 0; i < columns.n; ++i)
@@ -179,7 +202,7 @@ void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
   at.v = moving ? v_.data() : nullptr;
   at.prescribed = given_du_.data();
   calc_general_state(stack, at, of_E, state, columns);
-  const Vector6<double> c = to_array(state.c);
+  const Vector6<double> c = out.c = to_array(state.c);
   out.rows = out.held = out.basis.rows();
   for (int i = 0; i < out.held; ++i) {
     out.row[i] = out.basis.Q[i];
@@ -220,6 +243,7 @@ void LoopStates::update_distance(int l, const Transform<double>& X_FE, const Mot
   out.yields[0] = 0;
   const double bent = distance > 0 ? dot(across, across) / distance : 0;
   out.r[0] = out.bias = -bent - dot(n, turned);
+  out.c = {out.bias * n.x, out.bias * n.y, out.bias * n.z, 0, 0, 0};
   if (spring) {
     out.basis.dual[0] = out.row[0];
     out.dof[0] = loop.joint.v;

@@ -46,6 +46,7 @@ struct LoopState {
   Vector6<double> row[6];  ///< direction of each: of Q, then of P^+T
   double yields[6];        ///< by a unit of force: 1 / I of a rotor, else 0
   double r[6];             ///< row . c
+  Vector6<double> c;       ///< relative acceleration of F that no acceleration of the joint makes
   double bias;             ///< P^+ c of a joint of one axis
   double gap[6];           ///< position residual g [held]; 0 of rotors
   double slip[6];          ///< Q^T v_rel [held]: the rate of g where the gap is closed
@@ -82,6 +83,8 @@ class LoopStates {
                     const Motion<double>& of_b, const Motion<double>& of_E);
   void update_distance(int l, const Transform<double>& X_FE, const Motion<double>& of_E,
                        const Motion<double>& of_b);
+  /// Coordinates and rates of a prescribed joint, as the tree makes them.
+  void follow_tree(int l, const Transform<double>& X_FE, const Vector6<double>& relative);
   void place_given(const SweepInput<double>& in);
   Motion<double> velocity_of(int body) const {
     return body >= 0 ? bodies_[body].v : Motion<double>{};
@@ -95,7 +98,8 @@ class LoopStates {
   std::vector<LoopState> loops_;
   std::vector<double> start_, q_, v_;
   std::vector<double> given_v_, given_du_;  ///< of prescribed joints, else 0
-  bool any_given_ = false;
+  std::vector<Element> free_;               ///< the loop joints' elements, none prescribed
+  bool any_given_ = false, follows_tree_ = false;
 };
 
 /// What a loop's residuals are as a shift, m or m/s, and a turn, rad or rad/s.

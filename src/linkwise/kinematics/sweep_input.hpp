@@ -19,9 +19,11 @@ struct SweepInput {
   /// Torques of loop joints, [nv] of theirs; null: none.
   const S* loop_tau = nullptr;
   /// Coordinates of loop joints, [nq] of theirs: those of prescribed ones are given, and angles of
-  /// the others are continued from here, so that turns are counted; null: the zero position.
+  /// the others are continued from here, so that turns are counted. Null: angles are continued from
+  /// zero, and prescribed loop joints stand and move as the tree makes them.
   const S* loop_q = nullptr;
-  /// Rates and accelerations of prescribed loop joints, [nv] of loop joints; null: zero.
+  /// Rates, beside loop_q, and accelerations of prescribed loop joints, [nv] of loop joints; null:
+  /// zero.
   const S* loop_v = nullptr;
   const S* loop_du = nullptr;
   /// Who wants to know the loop joints' states; a method that does not find them itself leaves this

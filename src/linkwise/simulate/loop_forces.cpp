@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/forces/passive.hpp"
 
 namespace linkwise {
@@ -73,14 +74,14 @@ void LoopForces::accepted(double t, const double* q, const double* v) {
 void LoopForces::add_holding_torques(const double* loads) {
   const int n = setup_.model->n_joints();
   const auto& armature = loops_.dof[static_cast<int>(DofProperty::armature)];
+  std::vector<double> held(loops_.nv), rotors(loops_.nv);
+  add_armature_bias(loops_, v(), 1, rotors.data());
   for (int l = 0; l < setup_.model->n_loops(); ++l) {
     if (!is_prescribed(setup_.drives[n + l].kind)) continue;
     const JointInfo& joint = loops_.joints[l].joint;
-    for (int k = joint.first_element; k < joint.first_element + joint.n_elements; ++k) {
-      const Element& e = loops_.elements[k];
-      drive_[e.v] += torque_of_load(joint, e, loads + 6 * (n + l)) +
-                     armature[e.v] * given_du_[e.v] - tau_[e.v];
-    }
+    torques_of_load(joint, loops_.elements, q(), loads + 6 * (n + l), held.data());
+    for (int k = joint.v; k < joint.v + joint.nv; ++k)
+      drive_[k] += held[k] + armature[k] * given_du_[k] + rotors[k] - tau_[k];
   }
 }
 
@@ -95,10 +96,14 @@ double LoopForces::dissipated() const {
   return power;
 }
 
-double torque_of_load(const JointInfo& joint, const Element& element, const double* load) {
-  const Force<double> own = transpose_times(joint.to_user, to_force(load));
-  const bool turns = element.kind != ElementKind::prismatic;
-  return (turns ? own.ang.z : own.lin.z) + element.pitch * own.lin.z;
+void torques_of_load(const JointInfo& joint, const std::vector<Element>& elements, const double* q,
+                     const double* load, double* tau) {
+  Force<double> w = transpose_times(joint.to_user, to_force(load));
+  for (int i = joint.first_element + joint.n_elements - 1; i >= joint.first_element; --i) {
+    const Element& e = elements[i];
+    for (int k = 0; k < e.nv; ++k) tau[e.v + k] = dot(element_column<double>(e, k), w);
+    w = transpose_times(element_pose(e, q), w);
+  }
 }
 
 }  // namespace linkwise

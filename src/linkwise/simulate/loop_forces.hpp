@@ -51,7 +51,8 @@ class LoopForces {
   std::vector<double> near_q_, given_v_, given_du_, tau_, drive_;
 };
 
-/// The torque or force along the axis of a joint of one axis, of its load [6].
-double torque_of_load(const JointInfo& joint, const Element& element, const double* load);
+/// What a joint's load [6] is along its coordinates, into tau at the joint's degrees of freedom.
+void torques_of_load(const JointInfo& joint, const std::vector<Element>& elements, const double* q,
+                     const double* load, double* tau);
 
 }  // namespace linkwise

@@ -63,7 +63,6 @@ void Setup::settle() {
     throw InputError("state " + std::string(options.state->name) +
                      " takes no motion drives; use the state joint_rates for them");
   driven_ = driven_model(*model, drives);
-  if (model->n_loops() + model->n_couplings() > 0) require_one_axis();
   for (const Element& e : driven().elements)
     if (options.state && !e.prescribed && has_armature_bias(driven(), e))
       throw InputError("state " + std::string(options.state->name) + " takes no armatures" +
@@ -72,16 +71,6 @@ void Setup::settle() {
   require_determined(driven());
   find_breakpoints();
   settled_ = true;
-}
-
-/// Torques that hold joints in loops are read off their loads.
-void Setup::require_one_axis() const {
-  for (size_t j = 0; j < drives.size(); ++j)
-    if (is_prescribed(drives[j].kind) && model->joint_at(static_cast<int>(j)).nv != 1)
-      throw InputError("joint '" + model->joint_at(static_cast<int>(j)).name + "'" +
-                       model->where() +
-                       " has several axes and a given motion; of machines with closed loops, "
-                       "joints of one axis take that");
 }
 
 /// As fine as the error test can tell, but neither finer than tables are written nor so coarse that

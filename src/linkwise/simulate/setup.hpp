@@ -53,7 +53,6 @@ struct Setup {
 
  private:
   void find_breakpoints();
-  void require_one_axis() const;
 
   std::unique_ptr<const Model> driven_;
   std::vector<Breakpoints> breakpoints_;

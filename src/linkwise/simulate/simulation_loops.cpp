@@ -6,6 +6,7 @@
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/loop_work.hpp"
+#include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/simulate/given_motion.hpp"
 #include "linkwise/simulate/simulation.hpp"
 
@@ -260,17 +261,19 @@ void Simulation::add_holding_torques(const double* loads, std::span<const double
   forces_->add_holding_torques(total_.data());
 }
 
-/// What joints of given motion pass on along their axes, and what their rotors take, into total_.
+/// What joints of given motion pass on along their coordinates, and what their rotors take, into
+/// total_.
 void Simulation::calc_torques_of_loads(const double* loads) {
+  const std::vector<double>& armature = model().dof_values(DofProperty::armature);
   total_.assign(nv(), 0.0);
+  std::vector<double> rotors(nv());
+  add_armature_bias(model(), rates_in(y_.data()), 1, rotors.data());
   for (int j = 0; j < model().n_joints(); ++j) {
     if (!is_prescribed(setup_->drives[j].kind)) continue;
     const JointInfo& joint = model().joints[j];
-    for (int k = 0; k < joint.n_elements; ++k) {
-      const Element& e = model().elements[joint.first_element + k];
-      total_[e.v] = torque_of_load(joint, e, loads + 6 * j) +
-                    model().dof_values(DofProperty::armature)[e.v] * du_[e.v];
-    }
+    torques_of_load(joint, model().elements, y_.data(), loads + 6 * j, total_.data());
+    for (int k = joint.v; k < joint.v + joint.nv; ++k)
+      total_[k] += armature[k] * du_[k] + rotors[k];
   }
 }
 

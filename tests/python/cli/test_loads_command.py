@@ -141,6 +141,11 @@ def test_report_of_ten_joints_and_ten_seconds_is_small(tmp_path):
         (["nothing.zarr"], "does not exist"),
         (["run.zarr", "-j", "elbo"], "did you mean 'elbow'"),
         (["run.zarr", "--split", "sorts"], "--split: 'sorts' is unknown; use force or motion"),
+        (["run.zarr", "--driven", "elbow"], "--driven: goes with --split motion"),
+        (
+            ["run.zarr", "--split", "motion", "--driven", "elbow"],
+            "machines with closed loops; leave",
+        ),
         (["run.zarr", "--csv", "no/where.csv"], "does not exist; create it"),
         (["run.zarr", "--ratings", "bad.toml"], "bad.toml: rating.elbow.radal: unknown key"),
         (["run.zarr", "--ratings", "joint.toml"], "run holds no such joint; did you mean 'elbow'"),

@@ -227,3 +227,15 @@ def test_with_loop_refuses_as_the_builder_does(arm):
         model.with_loop("x", "composite", "base", "lower", axes=[("revolute", (0, 0, 1))] * 2)
     with pytest.raises(lw.InputError, match=r"joint 'shoulder'.* the name is used twice"):
         model.with_loop("shoulder", "fixed", "base", "lower")
+
+
+def test_it_starts_where_the_joint_that_closes_it_is(tmp_path):
+    free = run_four_bar(tmp_path, CLOSED)
+    pin = float(free["loop_position"].sel(loop_coordinate="pin").values[0]) + 0.2
+    run = run_four_bar(tmp_path, CLOSED + f"pin = {pin}\n")
+    assert run["loop_position"].sel(loop_coordinate="pin").values[0] == pytest.approx(pin)
+    assert "joints that were to be held had to move: " in str(run.warnings)
+    degrees = run_four_bar(tmp_path, CLOSED + f'pin = "{np.degrees(pin)} deg"\n')
+    np.testing.assert_allclose(degrees.position.values, run.position.values, atol=1e-6)
+    with pytest.raises(lw.InputError, match=r"'pin' closes a loop: this follows"):
+        run_four_bar(tmp_path, CLOSED + "[initial.velocity]\npin = 1.0\n")

@@ -103,8 +103,16 @@ def test_a_run_of_loops_is_split():
     peaks = lw.loads.split_at_peaks(run)
     np.testing.assert_allclose(peaks.share.sum("cause"), peaks.total, rtol=1e-12)
     assert "rigid bodies do not determine" in peaks.attrs["undetermined"]
-    with pytest.raises(lw.InputError, match='split them by "force"'):
+    with pytest.raises(lw.InputError, match="none does in this run; name them by driven"):
         lw.loads.split(run, "motion")
+    by_motion = lw.loads.split(run, "motion", driven=["A0"])
+    assert by_motion.cause.values.tolist() == ["gravity", "velocity", "acceleration"]
+    total = by_motion.sum("cause", skipna=False).transpose(*run.joint_load.dims).values
+    planar = [0, 1, 5]
+    scale = np.abs(by_motion.values).max()
+    np.testing.assert_allclose(
+        total[..., planar], run.joint_load.values[..., planar], rtol=0, atol=1e-8 * scale
+    )
 
 
 def test_what_rigid_bodies_do_not_determine_has_no_bound():

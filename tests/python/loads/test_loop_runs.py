@@ -96,9 +96,13 @@ def test_a_stored_run_is_read_and_viewed(run, tmp_path):
     np.testing.assert_array_equal(source.recording.load(3), stored.joint_load.values[3])
 
 
-def test_what_is_not_there_yet_says_so_in_one_line(run):
-    with pytest.raises(lw.InputError, match="loop"):
+def test_loads_by_motion_ask_what_drives_the_machine(run):
+    with pytest.raises(lw.InputError, match="depends on which joints drive it, and none does"):
         lw.loads.split(run, by="motion")
+    with pytest.raises(lw.InputError, match="cannot move by itself here once the driven joints"):
+        lw.loads.split(run, by="motion", driven=["A0", "A1"])
+    with pytest.raises(lw.InputError, match=r"driven: is for loads by motion of machines with"):
+        lw.loads.split(run, driven=["A0"])
 
 
 def said_of_loads(run):
