@@ -25,6 +25,7 @@ from linkwise.scenes.benchmark import Benchmark
 #: Machines of a few loops, and how long they move for their states [s].
 MACHINES = {
     "Stewart platform": ("stewart", {}, 0.3),
+    "biped, closed ankles": ("biped", {}, 0.2),
     "Andrews' mechanism": ("andrews", {}, 0.01),
     "six four-bars": ("four_bars", {"n": 6}, 0.5),
     "slider-crank": ("slider_crank", {}, 0.5),
@@ -114,6 +115,9 @@ class Pinocchio:
             axes = [(kind, np.array(axis)) for kind, axis in model.joint_axes[j]]
             if model.joint_types[j] == "spherical":
                 parent = self.model.addJoint(parent, pin.JointModelSpherical(), at, name)
+            elif model.joint_types[j] == "floating":
+                parent = self.model.addJoint(parent, pin.JointModelFreeFlyer(), at, name)
+                axes = []
             for k, (kind, axis) in enumerate(axes):
                 letter = "R" if kind == "revolute" else "P"
                 aligned = "XYZ"[int(np.argmax(np.abs(axis)))]

@@ -8,7 +8,7 @@ from helpers.closing_frames import closing_frames
 from linkwise._core import InputError
 from linkwise.scenes import benchmark
 
-NAMES = ("pendulum", "four_bars", "andrews", "bricard", "slider_crank", "stewart")
+NAMES = ("pendulum", "four_bars", "andrews", "bricard", "slider_crank", "stewart", "biped")
 WITH_LOOPS = NAMES[1:]
 
 
@@ -29,7 +29,7 @@ def test_loops_are_closed_where_it_starts(name):
     np.testing.assert_allclose(here, there, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["four_bars", "slider_crank"])
+@pytest.mark.parametrize("name", ["four_bars", "slider_crank", "biped"])
 def test_loops_stay_closed_to_first_order(name):
     found, step = benchmark(name), 1e-7
     assert found.v0.any()
@@ -49,6 +49,7 @@ def test_loops_stay_closed_to_first_order(name):
         ("slider_crank", 3, 1, 0.586656),
         ("flyball_governor", 4, 2, 13.9),
         ("stewart", 13, 5, 148.0),
+        ("biped", 19, 4, 38.2),
     ],
 )
 def test_sizes_and_masses(name, joints, loops, mass):

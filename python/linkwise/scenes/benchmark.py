@@ -49,7 +49,9 @@ def benchmark(name: str, *, n: int = 2) -> Benchmark:
         "flyball_governor" (A05): Watt's governor, whose slider hangs on two stiff springs and
         dampers; its shaft starts at 2 pi rad/s;
         "slider_crank": the rigid slider-crank of [simeon1996], its crank at 150 rad/s;
-        "stewart": a platform of 100 kg on six legs, each universal, prismatic and spherical.
+        "stewart": a platform of 100 kg on six legs, each universal, prismatic and spherical;
+        "biped": a pelvis on two legs in flight, hip of three axes and knee, whose feet two cranks
+        on each shank turn by two rods, as many walking robots have them, in round numbers.
     n: linkages of "four_bars".
 
     "A01" to "A05" are names of the same machines.
@@ -288,6 +290,71 @@ def stewart() -> Benchmark:
     return _at_rest(builder.build())
 
 
+#: Of each leg, hip to foot: joint, its axes, height on the body before [m], mass [kg], height of
+#: its centre [m], length [m].
+_LEG: tuple[tuple[str, list[tuple[float, float, float]], float, float, float, float], ...] = (
+    ("hip_yaw", [_Z], 0.0, 1.0, 0.0, 0.1),
+    ("hip_roll", [(1, 0, 0)], 0.0, 1.0, 0.0, 0.1),
+    ("hip_pitch", [(0, 1, 0)], 0.0, 5.0, -0.15, 0.4),
+    ("knee", [(0, 1, 0)], -0.4, 3.0, -0.15, 0.4),
+    ("ankle", [(0, 1, 0), (1, 0, 0)], -0.4, 1.0, -0.05, 0.1),
+)
+_BIPED_RATES = {"hip_yaw": 0.5, "hip_roll": -0.3, "hip_pitch": 1.0, "knee": -1.5}
+
+
+def biped() -> Benchmark:
+    """Drawn upright, with cranks level and rods along the shank; the legs swing apart."""
+    builder = ModelBuilder("biped")
+    builder.add_link("ground")
+    builder.add_link("pelvis", mass=15.0, com=(0, 0, 0.1), inertia=np.diag([0.2, 0.15, 0.2]))
+    builder.add_joint("pelvis", "floating", "ground", "pelvis", translation=(0, 0, 0.9))
+    rates = {}
+    for side, name in ((1.0, "left"), (-1.0, "right")):
+        inner = "pelvis"
+        for joint, axes, below, mass, center, length in _LEG:
+            body, at = f"{name}_{joint}_link", (0, 0.1 * side if inner == "pelvis" else 0, below)
+            inertia = _thin(2, mass, length, 0.1)
+            builder.add_link(body, mass=mass, com=(0, 0, center), inertia=inertia)
+            _turn(builder, f"{name}_{joint}", inner, body, at, axes)
+            inner = body
+        for end in ("inner", "outer"):
+            _add_ankle_rod(builder, name, end, 0.05 if end == "outer" else -0.05)
+        rates |= {f"{name}_{joint}": side * rate for joint, rate in _BIPED_RATES.items()}
+    return _moving(builder.build(), {}, rates)
+
+
+def _add_ankle_rod(builder: ModelBuilder, leg: str, end: str, y: float) -> None:
+    """A motor's crank on the shank, 0.3 m above the ankle, and the rod from it to the heel."""
+    crank, rod = f"{leg}_{end}_crank", f"{leg}_{end}_rod"
+    builder.add_link(crank, mass=0.2, com=(-0.025, 0, 0), inertia=np.diag([1e-4, 2e-4, 2e-4]))
+    _turn(builder, crank, f"{leg}_knee_link", crank, (0, y, -0.1), [(0, 1, 0)])
+    builder.add_link(rod, mass=0.1, com=(0, 0, -0.15), inertia=_thin(2, 0.1, 0.3, 0.01))
+    _turn(builder, rod, crank, rod, (-0.05, 0, 0), [(0, 1, 0), (1, 0, 0)])
+    builder.add_loop(
+        f"{leg}_{end}_heel",
+        "spherical",
+        f"{leg}_ankle_link",
+        rod,
+        translation=(-0.05, y, 0),
+        child_translation=(0, 0, -0.3),
+    )
+
+
+def _turn(
+    builder: ModelBuilder,
+    name: str,
+    parent: str,
+    child: str,
+    at: tuple[float, float, float],
+    axes: list[tuple[float, float, float]],
+) -> None:
+    """A hinge, or a universal joint of two axes."""
+    if len(axes) == 1:
+        builder.add_joint(name, "revolute", parent, child, translation=at, axis=axes[0])
+    else:
+        builder.add_joint(name, "universal", parent, child, translation=at, axes=axes)
+
+
 def _ring(radius: float, angles: Array, height: float) -> Array:
     """Points (n, 3) of a circle about z."""
     return np.stack(
@@ -325,6 +392,7 @@ _MAKERS: dict[str, Callable[..., Benchmark]] = {
     "flyball_governor": flyball_governor,
     "slider_crank": slider_crank,
     "stewart": stewart,
+    "biped": biped,
 }
 #: What the IFToMM benchmarks call them.
 _NUMBERED = dict(zip(("A01", "A02", "A03", "A04", "A05"), tuple(_MAKERS)[:5], strict=True))

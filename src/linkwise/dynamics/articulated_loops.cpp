@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/forces/armature_bias.hpp"
@@ -15,6 +16,11 @@ namespace {
 constexpr double weak_pivot = 1e-5;
 /// Pivots of the scaled Lambda below this are zero: rounding errors leave 1e-16 of a zero.
 constexpr double null_pivot = 1e-10;
+/// Independent rows answer alone where their pivots are so many times what is weak or zero, and
+/// where the others hold to this part of the accelerations.
+constexpr double clearly = 10, kept = 1e-11;
+/// Longer rows of Lambda are for a factor in blocks.
+constexpr int most_width = 256;
 
 /// Part of a list of ranges: bodies [begin, end).
 std::vector<KindRange> part_of(const std::vector<KindRange>& all, int begin, int end) {
@@ -125,19 +131,40 @@ bool ArticulatedLoops::respond(const double* q, const double* asked, double null
   return sound;
 }
 
-bool ArticulatedLoops::evaluate(const SweepInput<double>& in, double* du, double* loads) {
-  const bool with_loads = loads != nullptr;
-  report_ = {};
-  states_.update(in);
+bool ArticulatedLoops::evaluate(const SweepInput<double>& given, double* du, double* loads) {
+  SweepInput<double> in = given;
+  took_independent_ = false;
+  begin(in, loads != nullptr);
+  find_states(in);
+  if (in.on_loops) in.on_loops->found(states_, in);
   // A gap makes dependent constraints independent, by pivots of the order of its square: they are
   // zero as well. And it makes what they demand differ.
-  const double gap = widest_miss(model_, states_, false), slip = widest_miss(model_, states_, true);
+  const double gap = widest_miss(states_, false), slip = widest_miss(states_, true);
   if (!asked_) null_ = std::clamp(100 * gap * gap, null_pivot, 1e-4);
+  report_ = {};
   report_.open = std::max(gap, slip);
+  add_known_wrenches(in);
+  if (!loads && !asked_) {
+    if (!independent_known_) return find_independent(), evaluate(given, du, loads);
+    if (independent_) {
+      const Answer answer = evaluate_independent(in, du);
+      if (answer != Answer::none) return answer == Answer::good;
+      begin(in, false);
+      add_known_wrenches(in);
+    }
+  }
+  return evaluate_all(in, du, loads);
+}
+
+void ArticulatedLoops::begin(const SweepInput<double>& in, bool with_loads) {
   sweeps_.start(with_loads);
   sweeps_.calc_velocities(in, model_.kind_ranges);
   sweeps_.add_external(in);
-  add_known_wrenches(in);
+}
+
+/// By all rows.
+bool ArticulatedLoops::evaluate_all(const SweepInput<double>& in, double* du, double* loads) {
+  const bool with_loads = loads != nullptr;
   for (const Stage& stage : stages_) {
     sweeps_.eliminate_joints(in, stage.ranges, with_loads);
     if (failed_body() >= 0) return false;
@@ -158,6 +185,95 @@ bool ArticulatedLoops::evaluate(const SweepInput<double>& in, double* du, double
   for (int g = 0; g < static_cast<int>(shares_.size()); ++g)
     share_by_bearings(g, in.q, in.misfit_factor, loads);
   return true;
+}
+
+/// By independent rows, where these are far from dependent and the others hold as well.
+ArticulatedLoops::Answer ArticulatedLoops::evaluate_independent(const SweepInput<double>& in,
+                                                                double* du) {
+  IndependentLoops& loops = *independent_;
+  const Motion<double> ground = ground_acceleration<double>(model_, in.gravity_factor);
+  LoopReport found = report_;
+  for (const Stage& stage : stages_) {
+    sweeps_.eliminate_joints(in, stage.ranges, false);
+    if (failed_body() >= 0) return Answer::failed;
+    for (int g = stage.first_group; g < stage.last_group; ++g) {
+      loops.carry(sweeps_, in, states_, g);
+      if (!loops.factor(g, clearly * std::max(weak_pivot, null_))) return Answer::none;
+      if (groups_[g].top >= 0) sweeps_.receive(groups_[g].top, loops.reduce_top(g));
+      found.rows += groups_[g].rows - groups_[g].rotors;
+      found.rank += loops.rows(g) - groups_[g].rotors;
+      found.smallest_pivot = std::min(found.smallest_pivot, loops.smallest_pivot(g));
+    }
+  }
+  for (size_t i = stages_.size(); i-- > 0;) {
+    for (int g = stages_[i].first_group; g < stages_[i].last_group; ++g)
+      loops.solve(sweeps_, g, groups_[g].top >= 0 ? sweeps_.acceleration(groups_[g].top) : ground);
+    sweeps_.accelerate_bodies(in, stages_[i].ranges, du, false);
+  }
+  found.strong = found.rank;
+  found.contradiction = loops.missed(sweeps_, states_, ground);
+  if (!(found.contradiction < kept)) return Answer::none;
+  report_ = found;
+  took_independent_ = true;
+  return Answer::good;
+}
+
+/// Of rows that repeat each other at any position, as those across a plane do, some are enough.
+/// Which ones, positions drawn by a fixed rule tell: where most are independent, and furthest from
+/// dependent. None are taken where a machine that is closed at its zero position is singular there,
+/// because it may be everywhere (Bricard's hinges).
+void ArticulatedLoops::find_independent() {
+  independent_known_ = true;
+  if (!model_.couplings.empty() || groups_.empty()) return;
+  for (const LoopSystem& system : systems_)
+    if (system.width() > most_width) return;
+  constexpr int samples = 4;
+  const std::vector<double> start = model_.initial_configuration(), rest(model_.nv());
+  std::vector<double> q, du(model_.nv());
+  std::vector<std::vector<char>> taken(groups_.size());
+  double best = 0;
+  int rank = -1;
+  SweepInput<double> in;
+  in.tau = rest.data();
+  in.gravity_factor = 0;
+  std::uint32_t draw = 1;
+  for (int sample = 0; sample < samples; ++sample) {
+    q = start;
+    for (double& x : q) {
+      draw = 1664525 * draw + 1013904223;
+      x += 6 * (draw / 4294967296.0 - 0.5);
+    }
+    in.q = q.data();
+    if (!evaluate(in, du.data(), nullptr)) return;
+    if (report_.rank < rank || (report_.rank == rank && report_.smallest_pivot <= best)) continue;
+    rank = report_.rank;
+    best = report_.smallest_pivot;
+    for (size_t g = 0; g < groups_.size(); ++g) take_rows(static_cast<int>(g), taken[g]);
+  }
+  auto loops =
+      std::make_unique<IndependentLoops>(model_, groups_, taken, compliance_a_, compliance_b_);
+  in.q = start.data();
+  if (!evaluate(in, du.data(), nullptr)) return;
+  if (report_.open < 1e-6) {
+    begin(in, false);
+    independent_ = std::move(loops);
+    if (evaluate_independent(in, du.data()) != Answer::good) independent_.reset();
+  } else {
+    independent_ = std::move(loops);
+  }
+}
+
+/// Rows of a group that the last factor found to be independent, and those of rotors.
+void ArticulatedLoops::take_rows(int g, std::vector<char>& taken) const {
+  taken = systems_[g].independent();
+  for (const auto& member : groups_[g].members)
+    for (int i = states_[member.loop].held; i < member.n_rows; ++i) taken[member.row + i] = 1;
+}
+
+void ArticulatedLoops::find_states(const SweepInput<double>& in) {
+  states_.update(
+      in, [&](int n) { return sweeps_.pose(n); },
+      [&](int n) { return n >= 0 ? sweeps_.velocity(n) : Motion<double>{}; });
 }
 
 /// Unit forces where they act: on the bodies that the joint joins, or on the top.

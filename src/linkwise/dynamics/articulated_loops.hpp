@@ -7,11 +7,13 @@
 // Outward, f follows from a_top and is a known wrench from there on. Constraints that repeat each
 // other make Lambda singular: of all f that solve it the one of least f^T D f is taken, where D
 // holds what the two bodies of each joint yield to it, each alone. That is an energy, so the choice
-// depends on no unit and no frame. Accelerations are the same for all f.
+// depends on no unit and no frame. Accelerations are the same for all f, so those that are asked
+// for alone come of independent constraints (independent_loops.hpp).
 #include <memory>
 #include <vector>
 
 #include "linkwise/dynamics/bearing_shares.hpp"
+#include "linkwise/dynamics/independent_loops.hpp"
 #include "linkwise/dynamics/loop_groups.hpp"
 #include "linkwise/dynamics/loop_report.hpp"
 #include "linkwise/dynamics/loop_system.hpp"
@@ -40,6 +42,8 @@ class ArticulatedLoops {
   int failed_body() const { return sweeps_.failed_body(); }
   const LoopReport& report() const { return report_; }
   const LoopStates& states() const { return states_; }
+  /// Whether the last evaluation was by independent rows.
+  bool took_independent() const { return took_independent_; }
   const std::vector<LoopGroup>& groups() const { return groups_; }
 
   // Of the last evaluation, with loads: forces of a group that cancel.
@@ -64,6 +68,15 @@ class ArticulatedLoops {
     std::vector<double> y;                      ///< [columns of the joint][rows] of a carrier
   };
 
+  /// Of an evaluation by independent rows. none: it takes all.
+  enum class Answer { good, failed, none };
+
+  void begin(const SweepInput<double>& in, bool with_loads);
+  void find_states(const SweepInput<double>& in);
+  bool evaluate_all(const SweepInput<double>& in, double* du, double* loads);
+  Answer evaluate_independent(const SweepInput<double>& in, double* du);
+  void find_independent();
+  void take_rows(int g, std::vector<char>& taken) const;
   void carry(const SweepInput<double>& in, int g);
   void place_forces(const SweepInput<double>& in, int g);
   void place_coupling(const SweepInput<double>& in, int g, const LoopGroup::Member& member);
@@ -99,6 +112,8 @@ class ArticulatedLoops {
   std::vector<Stage> stages_;
   std::vector<Compliance<double>> compliance_a_, compliance_b_;  ///< by loop
   std::vector<std::vector<int>> terms_;  ///< by coupling: columns of its joints, -1: given motion
+  std::unique_ptr<IndependentLoops> independent_;  ///< made when accelerations are asked for
+  bool independent_known_ = false, took_independent_ = false;
   std::vector<Force<double>> load_;
   std::vector<BearingShares> shares_;  ///< by group, where the model has bearings
   std::vector<double> null_forces_, stresses_, alpha_;

@@ -90,6 +90,7 @@ class ClosedLoops : public DynamicsMethod {
     if (loads) kernel_.coupling_loads(in.q, coupling_load_);
     return report;
   }
+  bool finds_loops() const override { return true; }
   std::span<const double> coupling_load() const override { return coupling_load_; }
 
  private:

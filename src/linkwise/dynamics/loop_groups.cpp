@@ -69,6 +69,27 @@ int top_of(const Model& model, const LoopGroup::Member& member) {
   return top;
 }
 
+/// All loop joints that hold anything, and couplings; where in their group is not known yet.
+std::vector<LoopGroup::Member> all_members(const Model& model) {
+  std::vector<LoopGroup::Member> members;
+  for (int l = 0; l < model.n_loops(); ++l)
+    if (const int rows = loop_rows(model, model.loops.joints[l]); rows > 0)
+      members.push_back({l, -1, 0, rows, {}});
+  for (int c = 0; c < model.n_couplings(); ++c) members.push_back({-1, c, 0, 1, {}});
+  return members;
+}
+
+}  // namespace
+
+std::vector<int> bodies_of(const Model& model, const LoopGroup::Member& member, int top) {
+  std::vector<int> bodies;
+  for (const int end : ends_of(model, member))
+    walk_inward(model, end, top, [&](int body) { bodies.push_back(body); });
+  std::sort(bodies.begin(), bodies.end());
+  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
+  return bodies;
+}
+
 void add_carriers(const Model& model, LoopGroup& group) {
   std::map<int, std::vector<int>, std::greater<>> rows;  // by body, tip to base
   for (const auto& member : group.members)
@@ -92,27 +113,6 @@ void add_carriers(const Model& model, LoopGroup& group) {
       carrier.to.push_back(column_of(model.topology[carrier.body].parent, row));
   for (auto& member : group.members)
     for (const int end : ends_of(model, member)) member.at.push_back(column_of(end, member.row));
-}
-
-/// All loop joints that hold anything, and couplings; where in their group is not known yet.
-std::vector<LoopGroup::Member> all_members(const Model& model) {
-  std::vector<LoopGroup::Member> members;
-  for (int l = 0; l < model.n_loops(); ++l)
-    if (const int rows = loop_rows(model, model.loops.joints[l]); rows > 0)
-      members.push_back({l, -1, 0, rows, {}});
-  for (int c = 0; c < model.n_couplings(); ++c) members.push_back({-1, c, 0, 1, {}});
-  return members;
-}
-
-}  // namespace
-
-std::vector<int> bodies_of(const Model& model, const LoopGroup::Member& member, int top) {
-  std::vector<int> bodies;
-  for (const int end : ends_of(model, member))
-    walk_inward(model, end, top, [&](int body) { bodies.push_back(body); });
-  std::sort(bodies.begin(), bodies.end());
-  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
-  return bodies;
 }
 
 std::vector<LoopGroup> outline_loop_groups(const Model& model) {

@@ -36,6 +36,8 @@ struct LoopGroup {
 std::vector<int> bodies_of(const Model& model, const LoopGroup::Member& member, int top);
 /// Outermost tops first, the ground's group last.
 std::vector<LoopGroup> make_loop_groups(const Model& model);
+/// Columns and carriers of a group whose members have their rows.
+void add_carriers(const Model& model, LoopGroup& group);
 /// The same without columns and carriers.
 std::vector<LoopGroup> outline_loop_groups(const Model& model);
 

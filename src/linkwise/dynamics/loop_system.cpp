@@ -34,6 +34,12 @@ LoopSystem::LoopSystem(const LoopGroup& group) : profile_(profile_of(group)) {
   Lambda_.resize(profile_.n_entries());
 }
 
+int LoopSystem::width() const {
+  int width = 0;
+  for (int i = 0; i < profile_.size(); ++i) width = std::max(width, i - profile_.first(i));
+  return width;
+}
+
 void LoopSystem::clear() { std::fill(Lambda_.begin(), Lambda_.end(), 0.0); }
 
 /// L^-1 Lambda L^-T with D = L L^T, block by block of the lower triangle.
@@ -77,6 +83,13 @@ void LoopSystem::factor_exactly(double null) {
               &dense_[static_cast<size_t>(i) * n + profile_.first(i)]);
   }
   exact_.factor(n, dense_.data(), null);
+}
+
+std::vector<char> LoopSystem::independent() const {
+  std::vector<char> taken(profile_.size(), 0);
+  for (int k = 0; k < profile_.size(); ++k)
+    if (const int row = is_small() ? exact_.taken(k) : banded_.taken(k); row >= 0) taken[row] = 1;
+  return taken;
 }
 
 double LoopSystem::solve(std::vector<double>& x) {

@@ -16,6 +16,8 @@ class LoopSystem {
  public:
   explicit LoopSystem(const LoopGroup& group);
 
+  /// Of the longest row, left of its diagonal.
+  int width() const;
   void clear();
   /// Row i of Lambda, of which columns j <= i are asked.
   double* row(int i) { return profile_.row(Lambda_.data(), i); }
@@ -25,6 +27,8 @@ class LoopSystem {
   void factor(double null, bool least);
 
   int rank() const { return is_small() ? exact_.rank() : banded_.rank(); }
+  /// Which rows the last factor took as independent.
+  std::vector<char> independent() const;
   double smallest_pivot() const {
     return is_small() ? exact_.smallest_pivot() : banded_.smallest_pivot();
   }

@@ -69,8 +69,8 @@ DynamicsReport LoopedConstraintForce::evaluate(double, const SweepInput<double>&
   const bool least = loads != nullptr;
   system_.assemble(in);
   loops_ = {};
-  const double gap = widest_miss(*model_, system_.loops(), false);
-  loops_.open = std::max(gap, widest_miss(*model_, system_.loops(), true));
+  const double gap = widest_miss(system_.loops(), false);
+  loops_.open = std::max(gap, widest_miss(system_.loops(), true));
   DynamicsReport report;
   if (factor_)
     report.node =
@@ -143,7 +143,7 @@ bool LoopedConstraintForce::respond(const double* q, const double* asked, double
   in.gravity_factor = 0;
   system_.assemble(in, asked);
   loops_ = {};
-  const double gap = widest_miss(*model_, system_.loops(), false);
+  const double gap = widest_miss(system_.loops(), false);
   if (factor_ && factor_->factor(system_.A(), null_for(gap), false) >= 0) return false;
   if (!solve(system_.b(), f_, false).ok()) return false;
   describe(missed_);

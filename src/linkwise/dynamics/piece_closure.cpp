@@ -173,7 +173,7 @@ void PieceClosure::add_energy(const ClosedPiece& piece, int s) {
 }
 
 void PieceClosure::factor(bool with_loads) {
-  const double gap = widest_miss(model_, states_, false), slip = widest_miss(model_, states_, true);
+  const double gap = widest_miss(states_, false), slip = widest_miss(states_, true);
   report_ = {};
   report_.open = std::max(gap, slip);
   system_->clear();

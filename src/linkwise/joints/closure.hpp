@@ -39,6 +39,10 @@ inline void quaternion_of(const Mat3<double>& to_child, const double* last, doub
 
 /// Axis times angle, at most a half turn, of the rotation that takes the first axes to the child's.
 inline Vec3<double> rotation_vector(const Mat3<double>& to_child) {
+  const auto& m = to_child.m;
+  const Vec3<double> sine{0.5 * (m[5] - m[7]), 0.5 * (m[6] - m[2]), 0.5 * (m[1] - m[3])};
+  if (const double square = dot(sine, sine); square < 1e-6 && m[0] + m[4] + m[8] > 1)
+    return (1 + square * (1.0 / 6 + square * 3 / 40)) * sine;
   constexpr double positive[4] = {0, 0, 0, 1};
   double p[4];
   quaternion_of(to_child, positive, p);
@@ -172,6 +176,28 @@ inline Vector6<double> closure_gap(const Transform<double>& X_J, const Transform
   const Vec3<double> r = X_FE.R * (X_FE.r - X_J.r);
   const Vec3<double> turned = rotation_vector(X_FE.R * transpose(X_J.R));
   return {r.x, r.y, r.z, turned.x, turned.y, turned.z};
+}
+
+/// The same of a joint of one element, whose coordinates it finds as closure_coordinates() does. A
+/// hinge is turned back by the cosine and the sine that its angle comes from.
+inline Vector6<double> element_gap(const Element& e, const Transform<double>& X_FE, double* q) {
+  closure_coordinates({&e, 1}, X_FE, q);
+  if (e.kind == ElementKind::spherical) {  // which takes any turn
+    const Vec3<double> r = X_FE.R * (X_FE.r - e.placement.r);
+    return {r.x, r.y, r.z, 0, 0, 0};
+  }
+  if (e.kind != ElementKind::revolute) return closure_gap(element_pose(e, q), X_FE);
+  const Mat3<double> turned = X_FE.R * transpose(e.placement.R);
+  const auto& m = turned.m;
+  const double x = m[0] + m[4], y = m[1] - m[3], length = std::sqrt(x * x + y * y);
+  const double c = length > 0 ? x / length : 1, s = length > 0 ? y / length : 0;
+  Mat3<double> left = turned;
+  for (int i = 0; i < 9; i += 3) {
+    left.m[i] = c * m[i] + s * m[i + 1];
+    left.m[i + 1] = c * m[i + 1] - s * m[i];
+  }
+  const Vec3<double> r = X_FE.R * (X_FE.r - e.placement.r), rest = rotation_vector(left);
+  return {r.x, r.y, r.z, rest.x, rest.y, rest.z};
 }
 
 /// Position residuals g [rows], whose derivatives are Q^T (motion of F less that of E) where the

@@ -22,12 +22,12 @@ void require_coupled(const Model& model, const LoopStates& loops, const double* 
   constexpr double allowed = 1e-6;
   for (const Coupling& coupling : model.couplings) {
     const CouplingMiss miss = miss_of(coupling, coupled_state(q, v, loops));
-    const std::string name = "coupling '" + coupling.name + "'" + model.where();
+    const auto name = [&] { return where + "coupling '" + coupling.name + "'" + model.where(); };
     if (!(std::abs(miss.gap) <= allowed * (1 + miss.size)))
-      throw InputError(where + name + ": its coordinates add up to " + rounded(miss.gap) +
+      throw InputError(name() + ": its coordinates add up to " + rounded(miss.gap) +
                        " beside its offset; give q that keeps it");
     if (!(std::abs(miss.slip) <= allowed * (1 + miss.speed)))
-      throw InputError(where + name + ": its rates add up to " + rounded(miss.slip) +
+      throw InputError(name() + ": its rates add up to " + rounded(miss.slip) +
                        "; give v that keeps it");
   }
 }

@@ -21,14 +21,6 @@ std::vector<KindRange> carriers_of_loops(const Model& model) {
   return ranges;
 }
 
-/// Frame that a path starts from -> frame on the body that it leads to.
-Transform<double> along(const std::vector<int>& path, const Transform<double>& X_end,
-                        const std::vector<BodyState<double>>& bodies) {
-  Transform<double> X = X_end;
-  for (size_t i = path.size(); i-- > 0;) X = X * bodies[path[i]].X;
-  return X;
-}
-
 double size(const Vec3<double>& r) { return std::sqrt(dot(r, r)); }
 
 double length_of(const Model& model, const LoopJoint& loop, const LoopPath& path) {
@@ -45,6 +37,27 @@ std::string rounded(double x) {
   std::ostringstream text;
   text << std::setprecision(3) << x;
   return text.str();
+}
+
+/// As calc_general_state(), of pose and velocity alone.
+LoopStates::Moving moving_stack(const Model& model, const BodyTopology& body,
+                                const SweepInput<double>& in, const Motion<double>& v_parent) {
+  LoopStates::Moving own{{}, v_parent};
+  for (int i = 0; i < body.n_elements; ++i) {
+    const Element& e = model.elements[body.first_element + i];
+    const Transform<double> X = element_pose(e, in.q);
+    own.X = i == 0 ? X : X * own.X;
+    own.v = X * own.v;
+    for (int k = 0; k < e.nv && in.v; ++k) {
+      const Motion<double> column = element_column<double>(e, k);
+      own.v += Motion<double>{in.v[e.v + k] * column.lin, in.v[e.v + k] * column.ang};
+    }
+  }
+  return own;
+}
+
+std::string named(const Model& model, int l) {
+  return "joint '" + model.loops.joints[l].joint.name + "'" + model.where();
 }
 
 }  // namespace
@@ -90,44 +103,78 @@ LoopStates::LoopStates(const Model& model)
       given_v_(model.loops.nv),
       given_du_(model.loops.nv),
       free_(model.loops.elements) {
-  for (int l = 0; l < model.n_loops(); ++l) {
-    const LoopJoint& loop = model.loops.joints[l];
-    paths_.push_back(loop_path(model, loop));
-    loops_[l].length = length_of(model, loop, paths_[l]);
-  }
   for (Element& e : free_) {
     if (const int own = info_of(e.kind).quaternion; own >= 0) start_[e.q + own + 3] = 1;
     any_given_ |= e.prescribed;
     e.prescribed = false;
   }
+  std::map<Station, int> known;
+  for (int l = 0; l < model.n_loops(); ++l) {
+    const LoopJoint& loop = model.loops.joints[l];
+    paths_.push_back(loop_path(model, loop));
+    const LoopPath& path = paths_.back();
+    loops_[l].length = length_of(model, loop, path);
+    ends_.push_back({loop.parent_body, loop.joint.body, station_of(path.to_a, known),
+                     station_of(path.to_b, known)});
+    const std::span<const Element> stack = stack_of(model, loop);
+    is_element_.push_back(loop.kind == LoopKind::joint && stack.size() == 1 &&
+                          !stack[0].prescribed);
+    if (!is_element_.back()) continue;
+    Motion<double> P[6];
+    for (int k = 0; k < stack[0].nv; ++k) {
+      P[k] = element_column<double>(stack[0], k);
+      loops_[l].dof[k] = stack[0].v + k;
+    }
+    calc_closure_basis(P, stack[0].nv, loops_[l].basis);
+    set_rows(l);
+  }
+  pose_.resize(stations_.size());
+}
+
+/// The last station of a path.
+int LoopStates::station_of(const std::vector<int>& path, std::map<Station, int>& known) {
+  int at = -1;
+  for (const int body : path) {
+    const auto [found, is_new] = known.try_emplace({body, at}, static_cast<int>(stations_.size()));
+    if (is_new) stations_.push_back({body, at});
+    at = found->second;
+  }
+  return at;
 }
 
 void LoopStates::update(const SweepInput<double>& in) {
   bodies_.resize(model_.n_bodies());
-  general_.resize(model_.n_general);
-  calc_body_states(model_, carriers_, in, bodies_.data(), general_.data());
-  begin(in);
-  for (int l = 0; l < model_.n_loops(); ++l) {
-    const LoopJoint& loop = model_.loops.joints[l];
-    const Transform<double> here{Mat3<double>::identity(), {}};
-    update_loop(in.v != nullptr, l,
-                {along(paths_[l].to_a, here, bodies_), along(paths_[l].to_b, here, bodies_),
-                 velocity_of(loop.parent_body), velocity_of(loop.joint.body)});
-  }
+  const auto velocity = [&](int n) -> const Motion<double>& { return bodies_[n].v; };
+  sweep_outward(model_, carriers_, Motion<double>{}, velocity,
+                [&](auto joint, int n, const Motion<double>& v_parent) {
+                  using J = decltype(joint);
+                  const BodyTopology& at = model_.topology[n];
+                  const BodyConstants<double>& k = model_.constants[n];
+                  Moving& own = bodies_[n];
+                  if constexpr (is_general<J>) {
+                    own = moving_stack(model_, at, in, v_parent);
+                  } else {
+                    own.X = J::pose(k.tree, k.pitch, in.q[at.q]);
+                    own.v = own.X * v_parent;
+                    J::add_rate(own.v, k.pitch, in.v ? in.v[at.v] : 0);
+                  }
+                });
+  update(
+      in, [&](int n) -> const Transform<double>& { return bodies_[n].X; },
+      [&](int n) { return n >= 0 ? bodies_[n].v : Motion<double>{}; });
 }
 
 void LoopStates::update(const SweepInput<double>& in, const LoopEnds* ends) {
   begin(in);
-  for (int l = 0; l < model_.n_loops(); ++l) update_loop(in.v != nullptr, l, ends[l]);
+  for (int l = 0; l < n(); ++l) update_loop(l, ends[l]);
 }
 
+/// What is given of loop joints.
 void LoopStates::begin(const SweepInput<double>& in) {
+  moving_ = in.v != nullptr;
   std::copy_n(in.loop_q ? in.loop_q : start_.data(), q_.size(), q_.begin());
-  if (any_given_) place_given(in);
   follows_tree_ = any_given_ && !in.loop_q;
-}
-
-void LoopStates::place_given(const SweepInput<double>& in) {
+  if (!any_given_) return;
   for (const Element& e : model_.loops.elements) {
     if (!e.prescribed) continue;
     for (int i = e.v; i < e.v + e.nv; ++i) {
@@ -154,25 +201,69 @@ void LoopStates::follow_tree(int l, const Transform<double>& X_FE,
     given_v_[columns.dof[i]] = linkwise::along(basis.dual[i], relative);
 }
 
-void LoopStates::update_loop(bool moving, int l, const LoopEnds& ends) {
+void LoopStates::update_loop(int l, const LoopEnds& ends) {
   const LoopJoint& loop = model_.loops.joints[l];
   LoopState& out = loops_[l];
   const Transform<double> X_E = loop.on_parent * ends.X_a, X_F = loop.on_child * ends.X_b;
   const Transform<double> X_FE{X_F.R * transpose(X_E.R), X_E.R * (X_F.r - X_E.r)};
   out.X_FA = X_FE * loop.on_parent;
-  const Motion<double> of_a = out.X_FA * ends.v_a, of_b = loop.on_child * ends.v_b,
-                       of_E = loop.on_parent * ends.v_a;
+  const Motion<double> of_a = out.X_FA * ends.v_a, of_b = loop.on_child * ends.v_b;
   out.speed = std::max(size(of_a.lin) + out.length * size(of_a.ang),
                        size(of_b.lin) + out.length * size(of_b.ang));
-  if (loop.kind != LoopKind::joint)
-    update_distance(l, X_FE, of_E, of_b);
+  if (is_element_[l])
+    update_element(l, X_FE, of_a, of_b);
+  else if (loop.kind == LoopKind::joint)
+    update_stack(l, X_FE, of_a, of_b, loop.on_parent * ends.v_a);
   else
-    update_joint(moving, l, X_FE, of_a, of_b, of_E);
+    update_distance(l, X_FE, loop.on_parent * ends.v_a, of_b);
+  const LoopMiss gap = miss_of(out, out.gap), slip = miss_of(out, out.slip);
+  out.open = (gap.shift + gap.turn * out.length) / out.length;
+  out.opens = (slip.shift + slip.turn * out.length) / (out.speed + out.length);
 }
 
-void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
-                              const Motion<double>& of_a, const Motion<double>& of_b,
-                              const Motion<double>& of_E) {
+/// Rows from the basis.
+void LoopStates::set_rows(int l) {
+  LoopState& out = loops_[l];
+  out.rows = out.held = out.basis.rows();
+  for (int i = 0; i < out.held; ++i) {
+    out.row[i] = out.basis.Q[i];
+    out.yields[i] = 0;
+  }
+  const auto& armature = model_.loops.dof[static_cast<int>(DofProperty::armature)];
+  for (int k = 0; k < out.basis.n; ++k) {
+    const double I = armature[out.dof[k]];
+    if (!(I > 0)) continue;
+    const int i = out.rows++;
+    out.row[i] = out.basis.dual[k];
+    out.yields[i] = 1 / I;
+    out.gap[i] = out.slip[i] = 0;
+  }
+}
+
+/// One element. Its columns are constants in F's axes, which leaves c = (motion of E at F) x P u.
+void LoopStates::update_element(int l, const Transform<double>& X_FE, const Motion<double>& of_a,
+                                const Motion<double>& of_b) {
+  LoopState& out = loops_[l];
+  const Element& e = stack_of(model_, model_.loops.joints[l])[0];
+  closure_residual(out.basis, element_gap(e, X_FE, q_.data()), out.gap);
+  const Vector6<double> a = to_array(of_a), b = to_array(of_b);
+  Vector6<double> relative;
+  for (int i = 0; i < 6; ++i) relative[i] = b[i] - a[i];
+  Motion<double> joint{};
+  for (int k = 0; k < e.nv; ++k) {
+    const double u = linkwise::along(out.basis.dual[k], relative);
+    const auto column = element_column<double>(e, k);
+    v_[e.v + k] = u;
+    joint += Motion<double>{u * column.lin, u * column.ang};
+  }
+  const Vector6<double> c = out.c = to_array(cross(of_a, joint));
+  for (int i = 0; i < out.held; ++i) out.slip[i] = linkwise::along(out.basis.Q[i], relative);
+  for (int i = 0; i < out.rows; ++i) out.r[i] = linkwise::along(out.row[i], c);
+  out.bias = e.nv > 0 ? linkwise::along(out.basis.dual[0], c) : 0;
+}
+
+void LoopStates::update_stack(int l, const Transform<double>& X_FE, const Motion<double>& of_a,
+                              const Motion<double>& of_b, const Motion<double>& of_E) {
   const LoopJoint& loop = model_.loops.joints[l];
   LoopState& out = loops_[l];
   const std::span<const Element> stack = stack_of(model_, loop);
@@ -191,6 +282,7 @@ void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
   calc_general_state(stack, at, Motion<double>{}, state, columns);
   calc_closure_basis(columns.P, columns.n, out.basis);
   std::copy_n(columns.dof, columns.n, out.dof);
+  set_rows(l);
   closure_residual(out.basis, closure_gap(state.X, X_FE), out.gap);
 
   const Vector6<double> given = to_array(state.v);
@@ -199,25 +291,11 @@ void LoopStates::update_joint(bool moving, int l, const Transform<double>& X_FE,
     for (int i = e.v; e.prescribed && i < e.v + e.nv; ++i) v_[i] = given_v_[i];
   for (int i = 0; i < columns.n; ++i)
     v_[columns.dof[i]] = linkwise::along(out.basis.dual[i], relative);
-  at.v = moving ? v_.data() : nullptr;
+  at.v = moving_ ? v_.data() : nullptr;
   at.prescribed = given_du_.data();
   calc_general_state(stack, at, of_E, state, columns);
   const Vector6<double> c = out.c = to_array(state.c);
-  out.rows = out.held = out.basis.rows();
-  for (int i = 0; i < out.held; ++i) {
-    out.row[i] = out.basis.Q[i];
-    out.yields[i] = 0;
-    out.slip[i] = linkwise::along(out.basis.Q[i], relative);
-  }
-  const auto& armature = model_.loops.dof[static_cast<int>(DofProperty::armature)];
-  for (int k = 0; k < columns.n; ++k) {
-    const double I = armature[columns.dof[k]];
-    if (!(I > 0)) continue;
-    const int i = out.rows++;
-    out.row[i] = out.basis.dual[k];
-    out.yields[i] = 1 / I;
-    out.gap[i] = out.slip[i] = 0;
-  }
+  for (int i = 0; i < out.held; ++i) out.slip[i] = linkwise::along(out.basis.Q[i], relative);
   for (int i = 0; i < out.rows; ++i) out.r[i] = linkwise::along(out.row[i], c);
   out.bias = columns.n > 0 ? linkwise::along(out.basis.dual[0], c) : 0;
 }
@@ -268,14 +346,10 @@ LoopMiss miss_of(const LoopState& state, const double* residuals) {
   return {size({held[0], held[1], held[2]}), size({held[3], held[4], held[5]})};
 }
 
-double widest_miss(const Model& model, const LoopStates& states, bool of_rates) {
+double widest_miss(const LoopStates& states, bool of_rates) {
   double widest = 0;
-  for (int l = 0; l < model.n_loops(); ++l) {
-    const LoopState& loop = states[l];
-    const LoopMiss miss = miss_of(loop, of_rates ? loop.slip : loop.gap);
-    const double size = loop.length + (of_rates ? loop.speed : 0);
-    widest = std::max(widest, (miss.shift + miss.turn * loop.length) / size);
-  }
+  for (int l = 0; l < states.n(); ++l)
+    widest = std::max(widest, of_rates ? states[l].opens : states[l].open);
   return widest;
 }
 
@@ -283,15 +357,18 @@ void require_closed(const Model& model, const LoopStates& states, const std::str
   constexpr double allowed = 1e-6;
   for (int l = 0; l < model.n_loops(); ++l) {
     const LoopState& loop = states[l];
-    const std::string joint = "joint '" + model.loops.joints[l].joint.name + "'" + model.where();
-    const LoopMiss gap = miss_of(loop, loop.gap), slip = miss_of(loop, loop.slip);
-    if (!(gap.shift + gap.turn * loop.length <= allowed * loop.length))
-      throw InputError(where + joint + " is open: what it joins is " + rounded(1e3 * gap.shift) +
-                       " mm and " + rounded(gap.turn) + " rad apart; give q that closes its loop");
-    if (!(slip.shift + slip.turn * loop.length <= allowed * (loop.speed + loop.length)))
-      throw InputError(where + joint + " opens: what it joins parts by " + rounded(slip.shift) +
-                       " m/s and " + rounded(slip.turn) +
+    if (!(loop.open <= allowed)) {
+      const LoopMiss gap = miss_of(loop, loop.gap);
+      throw InputError(where + named(model, l) + " is open: what it joins is " +
+                       rounded(1e3 * gap.shift) + " mm and " + rounded(gap.turn) +
+                       " rad apart; give q that closes its loop");
+    }
+    if (!(loop.opens <= allowed)) {
+      const LoopMiss slip = miss_of(loop, loop.slip);
+      throw InputError(where + named(model, l) + " opens: what it joins parts by " +
+                       rounded(slip.shift) + " m/s and " + rounded(slip.turn) +
                        " rad/s; give v that keeps its loop closed");
+    }
   }
 }
 

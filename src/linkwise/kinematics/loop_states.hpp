@@ -10,6 +10,8 @@
 // yield by s / I.
 // What is left of the pose is the gap, which is closed in a state that is consistent. A rod has no
 // P, and Q is the one direction n from E to F. A spring has no Q, and P^+T is n.
+#include <compare>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -52,6 +54,7 @@ struct LoopState {
   double slip[6];          ///< Q^T v_rel [held]: the rate of g where the gap is closed
   double speed;            ///< of the faster one of E and F at F, m/s; turns count by the length
   double length;           ///< m: how far the loop reaches, by which turns are compared
+  double open, opens;      ///< the gap over the length, and the slip over length and speed
 };
 
 /// What a sweep knows of the bodies that a loop joint joins: their frames against that of the body
@@ -63,43 +66,80 @@ struct LoopEnds {
 
 class LoopStates {
  public:
+  /// A body: parent's frame -> its own, and its velocity.
+  struct Moving {
+    Transform<double> X;
+    Motion<double> v;
+  };
+
   explicit LoopStates(const Model& model);
 
   void update(const SweepInput<double>& in);
   /// The same where the ends of all loops are known, [n_loops].
   void update(const SweepInput<double>& in, const LoopEnds* ends);
+  /// The same where the bodies' motion is known: pose(n) in the parent's frame, velocity(n).
+  template <class Pose, class Velocity>
+  void update(const SweepInput<double>& in, Pose&& pose, Velocity&& velocity) {
+    begin(in);
+    for (size_t i = 0; i < stations_.size(); ++i) {
+      const auto [body, inner] = stations_[i];
+      pose_[i] = inner >= 0 ? pose(body) * pose_[inner] : pose(body);
+    }
+    const auto at = [&](int station) { return station >= 0 ? pose_[station] : here(); };
+    for (int l = 0; l < n(); ++l) {
+      const Ends& ends = ends_[l];
+      update_loop(l, {at(ends.at_a), at(ends.at_b), velocity(ends.body_a), velocity(ends.body_b)});
+    }
+  }
 
   const LoopState& operator[](int l) const { return loops_[l]; }
+  int n() const { return static_cast<int>(loops_.size()); }
+  /// Are its P and Q constants?
+  bool is_element(int l) const { return is_element_[l]; }
   const LoopPath& path(int l) const { return paths_[l]; }
   /// Coordinates and rates of all loop joints.
   const std::vector<double>& q() const { return q_; }
   const std::vector<double>& v() const { return v_; }
 
  private:
+  /// A body on the way from where a loop meets to its ends. Loops share them.
+  struct Station {
+    int body, inner;  ///< inner: the one before, -1: the body where the loop meets
+    auto operator<=>(const Station&) const = default;
+  };
+  struct Ends {
+    int body_a, body_b;  ///< -1: ground
+    int at_a, at_b;      ///< stations, -1: where the loop meets
+  };
+
+  int station_of(const std::vector<int>& path, std::map<Station, int>& known);
   void begin(const SweepInput<double>& in);
-  void update_loop(bool moving, int l, const LoopEnds& ends);
-  /// The same of a joint, and of a rod or a spring. of_a, of_b: velocities of both bodies at F.
-  void update_joint(bool moving, int l, const Transform<double>& X_FE, const Motion<double>& of_a,
+  static Transform<double> here() { return {Mat3<double>::identity(), {}}; }
+  void update_loop(int l, const LoopEnds& ends);
+  /// of_a, of_b: velocities of both bodies at F; of_E: of body a at E.
+  void update_element(int l, const Transform<double>& X_FE, const Motion<double>& of_a,
+                      const Motion<double>& of_b);
+  void update_stack(int l, const Transform<double>& X_FE, const Motion<double>& of_a,
                     const Motion<double>& of_b, const Motion<double>& of_E);
   void update_distance(int l, const Transform<double>& X_FE, const Motion<double>& of_E,
                        const Motion<double>& of_b);
   /// Coordinates and rates of a prescribed joint, as the tree makes them.
   void follow_tree(int l, const Transform<double>& X_FE, const Vector6<double>& relative);
-  void place_given(const SweepInput<double>& in);
-  Motion<double> velocity_of(int body) const {
-    return body >= 0 ? bodies_[body].v : Motion<double>{};
-  }
+  void set_rows(int l);
 
   const Model& model_;
   std::vector<KindRange> carriers_;  ///< all bodies between the ground and loop joints
   std::vector<LoopPath> paths_;
-  std::vector<BodyState<double>> bodies_;
-  std::vector<GeneralState<double>> general_;
+  std::vector<Station> stations_;
+  std::vector<Transform<double>> pose_;  ///< frame of the body where the loop meets -> station
+  std::vector<Ends> ends_;
+  std::vector<char> is_element_;  ///< joints of one element, whose P and Q are constant
+  std::vector<Moving> bodies_;    ///< made where nobody else knows them
   std::vector<LoopState> loops_;
   std::vector<double> start_, q_, v_;
   std::vector<double> given_v_, given_du_;  ///< of prescribed joints, else 0
   std::vector<Element> free_;               ///< the loop joints' elements, none prescribed
-  bool any_given_ = false, follows_tree_ = false;
+  bool moving_ = false, any_given_ = false, follows_tree_ = false;
 };
 
 /// What a loop's residuals are as a shift, m or m/s, and a turn, rad or rad/s.
@@ -109,7 +149,7 @@ struct LoopMiss {
 LoopMiss miss_of(const LoopState& state, const double* residuals);
 
 /// The widest gap of all loops, or slip, over its loop's length, or speed.
-double widest_miss(const Model& model, const LoopStates& states, bool of_rates);
+double widest_miss(const LoopStates& states, bool of_rates);
 
 /// InputError naming the first loop that a state leaves open, or opens, by more than a millionth of
 /// its length. `where`: begins the message.

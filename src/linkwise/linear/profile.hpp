@@ -44,6 +44,8 @@ class ProfileFactor {
               const std::vector<double>& A, double null);
 
   int rank() const { return rank_; }
+  /// The row of pivot k, or -1 if that is zero.
+  int taken(int k) const { return pivot_[k] > 0 ? order_[k] : -1; }
   /// How many pivots are larger than `least`.
   int rank_above(double least) const;
   /// The least over the largest that are not zero; 1 if there are none.

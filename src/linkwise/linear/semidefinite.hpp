@@ -16,6 +16,8 @@ class SemidefiniteFactor {
 
   int size() const { return n_; }
   int rank() const { return rank_; }
+  /// The row of pivot k, or -1 if that is zero.
+  int taken(int k) const { return k < rank_ ? order_[k] : -1; }
   /// How many pivots are larger than `least`.
   int rank_above(double least) const;
   /// The last that was not zero, over the first; 1 if there are none.

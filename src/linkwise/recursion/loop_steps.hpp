@@ -20,29 +20,33 @@ struct LoopColumn {
   S beta;
 };
 
+// A column may be several, in the lanes of T.
+
 /// Each returns the number of columns z.
-template <class J, class S>
+template <class J, class S, class T>
 LW_INLINE int carry(const EliminatedAxis<S>& axis, const Motion<S>& c, double pitch,
-                    LoopColumn<S>& column) {
+                    LoopColumn<T>& column) {
   column.z[0] += J::project(column.F, pitch);
-  const S y = column.z[0] * axis.D_inverse;
+  const T y = column.z[0] * axis.D_inverse;
   column.y[0] = y;
   column.F -= y * axis.U;
   column.beta = y * axis.h + dot(c, column.F);
   return 1;
 }
 
-template <class S>
-int carry(const GeneralState<S>& joint, const EliminatedStack<S>& stack, const Motion<S>& c,
-          LoopColumn<S>& column) {
+template <class S, class T>
+LW_INLINE int carry(const GeneralState<S>& joint, const EliminatedStack<S>& stack,
+                    const Motion<S>& c, LoopColumn<T>& column) {
+  T L[21];
+  for (int i = 0; i < packed(joint.n, 0); ++i) L[i] = T{} + stack.L[i];
   for (int k = 0; k < joint.n; ++k) {
     column.z[k] += dot(joint.P[k], column.F);
     column.y[k] = column.z[k];
   }
-  cholesky_solve(joint.n, stack.L, column.y);
-  column.beta = S{};
+  cholesky_solve(joint.n, L, column.y);
+  column.beta = T{};
   for (int k = 0; k < joint.n; ++k) {
-    const S y = column.y[k];
+    const T y = column.y[k];
     column.F -= y * stack.U[k];
     column.beta += y * stack.h[k];
   }
@@ -51,9 +55,11 @@ int carry(const GeneralState<S>& joint, const EliminatedStack<S>& stack, const M
 }
 
 /// A floating joint transmits nothing.
-template <class S>
-int carry(const EliminatedFree<S>& free, LoopColumn<S>& column) {
-  const Vector6<S> z = to_array(column.F), y = to_array(solve(free.L, column.F));
+template <class S, class T>
+int carry(const EliminatedFree<S>& free, LoopColumn<T>& column) {
+  T L[21];
+  for (int i = 0; i < 21; ++i) L[i] = T{} + free.L[i];
+  const Vector6<T> z = to_array(column.F), y = to_array(solve(L, column.F));
   for (int k = 0; k < 6; ++k) {
     column.z[k] = z[k];
     column.y[k] = y[k];
@@ -61,6 +67,20 @@ int carry(const EliminatedFree<S>& free, LoopColumn<S>& column) {
   column.beta = dot(free.a, column.F);
   column.F = {};
   return 6;
+}
+
+/// The joint under forces of which z and y add up to these, by the columns of the joint.
+template <class S>
+LW_INLINE void apply(const S* z, const S*, int, EliminatedAxis<S>& axis) {
+  axis.h += z[0];
+}
+template <class S>
+LW_INLINE void apply(const S* z, const S*, int n, EliminatedStack<S>& stack) {
+  for (int k = 0; k < n; ++k) stack.h[k] += z[k];
+}
+template <class S>
+LW_INLINE void apply(const S*, const S* y, int, EliminatedFree<S>& free) {
+  free.a += to_motion(y);
 }
 
 /// The joint under the force f.

@@ -55,6 +55,15 @@ class TreeSweeps {
   const Motion<S>& velocity(int n) const { return body_[n].velocity; }
   const Motion<S>& acceleration(int n) const { return body_[n].acceleration; }
   const Contribution<S>& sum(int n) const { return body_[n].sum; }
+  /// Parent's frame -> body n's, after calc_velocities().
+  Transform<S> pose(int n) const {
+    if (model_.topology[n].joint_kind != JointKind::hinge) return pose_[n];
+    const HingePlacement<double> k = placement(model_.constants[n]);
+    const S c = body_[n].cosine, s = body_[n].sine;
+    const double ca = k.cos_alpha, sa = k.sin_alpha;
+    return {{{c, s * ca, s * sa, -s, c * ca, c * sa, S{}, S{} - sa, S{} + ca}},
+            {S{} + k.a, S{} - k.d * sa, S{} + k.d * ca}};
+  }
   void set_velocity(int n, const Motion<S>& v) { body_[n].velocity = v; }
   void set_acceleration(int n, const Motion<S>& a) { body_[n].acceleration = a; }
   void set_joint_load(int n, const Force<S>& w) { reduced_[n].joint_load = w; }
@@ -215,13 +224,14 @@ class TreeSweeps {
 
   /// Forces of loops on body n, whose joint is eliminated, carried across that joint. Returns how
   /// many columns the joint has.
-  int carry_loops(const SweepInput<S>& in, int n, std::span<LoopColumn<S>> columns) const {
+  template <class T>
+  int carry_loops(const SweepInput<S>& in, int n, std::span<LoopColumn<T>> columns) const {
     int count = 0;
     with_joint(n, [&](auto joint, const BodyTopology& at) {
       using J = decltype(joint);
       const Body& b = body_[n];
       const double pitch = model_.constants[n].pitch;
-      for (LoopColumn<S>& column : columns) {
+      for (LoopColumn<T>& column : columns) {
         if constexpr (is_general<J>) {
           const Stack& own = stack_[at.general];
           count = own.is_free ? carry(own.free, column)
@@ -230,13 +240,31 @@ class TreeSweeps {
           const Motion<S> c = J::bias(b.velocity, pitch, in.v ? in.v[at.v] : S{});
           count = carry<J>(b.axis, c, pitch, column);
         }
-        column.at_parent = place<J>(n).to_parent(column.F);
+        column.at_parent = to_parent<J>(n, column.F);
       }
     });
     return count;
   }
 
-  /// The same forces, now known.
+  /// How many columns body n's joint has.
+  int n_columns(int n) const {
+    const BodyTopology& at = model_.topology[n];
+    if (at.joint_kind != JointKind::general) return 1;
+    return stack_[at.general].is_free ? 6 : general_[at.general].n;
+  }
+
+  /// The same forces, now known: of each column of the joint the sums of f z and f y.
+  void apply_loops(int n, const S* z, const S* y) {
+    with_joint(n, [&](auto joint, const BodyTopology& at) {
+      if constexpr (!is_general<decltype(joint)>)
+        apply(z, y, 1, body_[n].axis);
+      else if (stack_[at.general].is_free)
+        apply(z, y, 6, stack_[at.general].free);
+      else
+        apply(z, y, general_[at.general].n, stack_[at.general].columns);
+    });
+  }
+  /// And each column on its own, for loads.
   void apply_loops(int n, std::span<const LoopColumn<S>> columns, const S* f, bool with_loads) {
     with_joint(n, [&](auto joint, const BodyTopology& at) {
       for (size_t i = 0; i < columns.size(); ++i) {
@@ -321,6 +349,19 @@ class TreeSweeps {
       return TurnedHinge<double, S>{placement(model_.constants[n]), body_[n].cosine, body_[n].sine};
     else
       return Pose<S>{pose_[n]};
+  }
+
+  /// X^T F of body n, of forces in lanes as well.
+  template <class J, class T>
+  LW_INLINE Force<T> to_parent(int n, const Force<T>& F) const {
+    if constexpr (std::is_same_v<S, T>)
+      return place<J>(n).to_parent(F);
+    else if constexpr (J::is_hinge)
+      return TurnedHinge<double, T>{placement(model_.constants[n]), T{} + body_[n].cosine,
+                                    T{} + body_[n].sine}
+          .to_parent(F);
+    else
+      return transpose_times(pose_[n], F);
   }
 
   template <class J>
