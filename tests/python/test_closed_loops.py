@@ -533,3 +533,88 @@ def test_a_net_accelerates_as_its_bodies_do_by_themselves():
     found = lw.forward_dynamics(model, model.neutral_configuration(), np.zeros(model.nv))
     assert np.abs(want).max() > 1
     assert np.abs(found - want).max() < 1e-10 * np.abs(want).max()
+
+
+def flat_triangle(gravity) -> lw.Model:
+    """Bars of 1 m and 1 m between hinges 2 m apart: it cannot move, and is not held."""
+    builder = lw.ModelBuilder("flat", gravity=gravity)
+    builder.add_link("ground")
+    for name in ("left", "right"):
+        rod(builder, name, 1.0)
+    builder.add_joint("a", "revolute", "ground", "left", axis=(0, 1, 0))
+    ends = {"translation": (1, 0, 0), "axis": (0, 1, 0)}
+    builder.add_joint("b", "revolute", "left", "right", **ends)
+    builder.add_rod("c", "ground", "right", length=1.0, point=(3, 0, 0), child_point=(1, 0, 0))
+    return builder.build()
+
+
+def test_a_triangle_folded_flat_stands_or_is_refused():
+    with pytest.raises(lw.InputError, match="at rest in a singular position that it cannot leave"):
+        lw.simulate(flat_triangle((0, 0, -9.81)), duration=1)
+    along = lw.simulate(flat_triangle((-9.81, 0, 0)), duration=1)
+    assert along.attrs["outcome"] == "converged"
+    np.testing.assert_array_equal(along.position.values, 0)
+
+
+def test_machines_that_their_loops_hold_stand_still():
+    """A bar across a corner: what holds it does so by finite forces."""
+    builder = lw.ModelBuilder("strut")
+    builder.add_link("ground")
+    rod(builder, "bar", 1.0)
+    builder.add_joint("a", "revolute", "ground", "bar", axis=(0, 1, 0))
+    builder.add_rod("tie", "ground", "bar", length=2**0.5, point=(0, 0, 1), child_point=(1, 0, 0))
+    run = lw.simulate(builder.build(), duration=1)
+    # Moments about the hinge: half the weight at the tip, along a tie at 45 degrees.
+    tie = run.joint_load.sel(joint="tie").values[:, :3]
+    np.testing.assert_allclose(np.linalg.norm(tie, axis=1), 9.81 / 2 * 2**0.5, rtol=1e-12)
+
+
+def test_rates_that_open_loops_are_told():
+    model = benchmark("four_bars", n=1).model
+    q0, v0 = state(model, A=np.pi + 1, B=-np.pi - 1), state(model, A0=1.0, A1=1.0, B0=-1.0)
+    assert "rates" not in str(lw.simulate(model, duration=0.1, q0=q0, v0=v0).warnings)
+    v0[list(model.joint_names).index("A1")] = 2.0
+    run = lw.simulate(model, duration=0.1, q0=q0, v0=v0)
+    got = run.velocity.values[0]
+    (said,) = [w["text"] for w in run.warnings if w["element"] == "assembly"]
+    for name, asked, rate in zip(model.joint_names, v0, got, strict=True):
+        assert f"'{name}' is {rate:.3g} instead of {asked:.3g}" in said
+    with pytest.raises(lw.InputError, match="opens"):
+        lw.simulate(model, duration=0.1, q0=q0, v0=v0, assemble="exact")
+    members = lw.simulate_batch(model, duration=0.1, step=1e-3, q0=[q0, q0], v0=[v0, 0 * v0])
+    assert "rates that keep loops closed are not those asked for" in members.attrs["warnings"]
+
+
+def bent_ring(seed: int) -> lw.Model:
+    """A ring of four joints and a rod in space, which can move in one way."""
+    rng = np.random.default_rng(seed)
+    builder = lw.ModelBuilder("ring")
+    builder.add_link("ground")
+    corners = [(np.cos(k * np.pi / 2), np.sin(k * np.pi / 2), 0) for k in range(4)]
+    at = [np.array(corner) + 0.2 * rng.normal(size=3) for corner in corners]
+    for k in (1, 2, 3):
+        A, mass = rng.normal(size=(3, 3)), rng.uniform(0.5, 3)
+        inertia = 0.05 * A @ A.T + 0.1 * np.eye(3)
+        builder.add_link(f"L{k}", mass=mass, com=(at[k] - at[k - 1]) / 2, inertia=inertia)
+    axes = rng.normal(size=(4, 2, 3))
+    axes /= np.linalg.norm(axes, axis=2, keepdims=True)
+    builder.add_joint("a", "planar", "ground", "L1", translation=at[0], axis=axes[0][0])
+    for k, name in ((1, "b"), (2, "c")):
+        place = {"translation": at[k] - at[k - 1], "axes": list(axes[k])}
+        builder.add_joint(name, "universal", f"L{k}", f"L{k + 1}", **place)
+    ends = {"translation": at[3], "child_translation": at[3] - at[2]}
+    builder.add_loop("d", "revolute", "ground", "L3", axis=axes[3][0], **ends)
+    point, child = 1.6 * rng.normal(size=3), 0.4 * rng.normal(size=3)
+    length = np.linalg.norm(at[2] + child - point)
+    builder.add_rod("rod", "ground", "L3", length=length, point=point, child_point=child)
+    return builder.build()
+
+
+@pytest.mark.parametrize("seed", [74, 553, 733])
+def test_runs_that_end_between_samples_say_why(seed):
+    """These meet a singular position, and what ends them is a sample, which nobody interrupted."""
+    run = lw.simulate(
+        bent_ring(seed), duration=1, every=1e-3, tolerance=1e-8, on_failure="return", max_steps=5000
+    )
+    assert run.attrs["outcome"] in ("singular_position", "converged")
+    assert "interrupted" not in run.attrs["message"]

@@ -98,3 +98,33 @@ duration = 0.1
     path.write_text(path.read_text().replace("[0.5, -0.25]", "[1, 2, 3, 4, 5]"))
     with pytest.raises(lw.InputError, match=r"cam.toml: coupling\.cam\.factors"):
         lw.load_scenario(path)
+
+
+@pytest.mark.parametrize("hold", [[], ["joint_1"]])
+def test_couplings_that_contradict_each_other_are_both_named(hold):
+    arm = lw.scenes.chain(4)
+    fine = arm.with_coupling("fine", {"joint_3": 1, "joint_4": -1})
+    one = fine.with_coupling("one", {"joint_1": 1, "joint_2": 1})
+    both = one.with_coupling("other", {"joint_1": 1, "joint_2": 1}, offset=0.1)
+    said = r"^couplings 'one' and 'other' contradict each other: no position"
+    with pytest.raises(lw.InputError, match=said):
+        lw.simulate(both, duration=0.1, hold=hold)
+    with pytest.raises(lw.InputError, match=said):
+        lw.assemble(both)
+
+
+def test_a_coupling_and_a_rod_that_contradict_each_other_are_named():
+    arm = lw.scenes.chain(2)
+    base, tip = arm.parent_link_names[0], arm.child_link_names[1]
+    straight = arm.with_rod("strut", base, tip, length=1.9, child_point=(0, 0, -1))
+    folded = straight.with_coupling("fold", {"joint_2": 1}, offset=2.0)
+    with pytest.raises(lw.InputError, match=r"^coupling 'fold' and joint 'strut' contradict"):
+        lw.simulate(folded, duration=0.1)
+
+
+def test_a_coupling_that_no_position_keeps_says_by_how_much():
+    """q^2 = -1 is nearest at 0."""
+    arm = lw.scenes.chain(2).with_coupling("c", {"joint_1": [0, 1]}, offset=-1)
+    said = r"^coupling 'c': no position .* at best its coordinates add up to 1 beside its offset"
+    with pytest.raises(lw.InputError, match=said):
+        lw.simulate(arm, duration=0.1)

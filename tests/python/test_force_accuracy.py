@@ -135,3 +135,25 @@ def test_what_rounding_leaves_is_said():
     assert "softer" in note["text"]
     run = lw.simulate(rod(), **options, drives={"hinge": lw.PD(1e6, 1e3, -0.5)})
     assert not [note for note in run.warnings if note["element"] == "forces"]
+
+
+@pytest.mark.parametrize("options", [{}, {"integrator": "runge_kutta_4", "step": 1e-4}])
+def test_springs_of_what_falls_freely_carry_nothing_and_raise_no_warning(options):
+    """What rounding makes of the weight is no force to be known."""
+    rng = np.random.default_rng(0)
+    builder = lw.ModelBuilder("falling")
+    builder.add_link("world")
+    for k, mass in enumerate((2, 2, 2, 0.05)):
+        com, inertia = 0.1 * rng.normal(size=3), np.diag([1e-3, 2e-3, 2.5e-3])
+        builder.add_link(f"l{k}", mass=mass, com=com, inertia=inertia)
+    builder.add_joint("base", "floating", "world", "l0")
+    for k in range(1, 4):
+        place = {"translation": 0.3 * rng.normal(size=3), "axis": rng.normal(size=3)}
+        springs = {"stiffness": 1e3, "damping": 0.1}
+        builder.add_joint(f"j{k}", "revolute", f"l{k - 1}", f"l{k}", **place, **springs)
+    model = builder.build()
+    q0 = model.neutral_configuration()
+    q0[3:7] = np.array([0.1, -0.7, 0.5, 0.5])
+    run = lw.simulate(model, duration=0.5, q0=q0, **options)
+    assert np.abs(run.joint_load.values).max() < 1e-8
+    assert "the force of" not in run.attrs.get("warnings", "")

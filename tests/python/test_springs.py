@@ -254,3 +254,34 @@ def test_what_python_refuses():
         balanced(armature=1.0)
     with pytest.raises(lw.InputError, match=r"is a rod or a spring, whose motion cannot be given"):
         balanced().prescribe(["spring"])
+
+
+def test_a_spring_whose_ends_meet_has_no_direction():
+    model = balanced()
+    at_end = {"point": (0.6, 0, 0), "child_point": (0.6, 0, 0)}
+    pushing = model.with_spring("pusher", "base", "arm", length=0.5, stiffness=100, **at_end)
+    said = "^spring 'pusher': its ends meet, so that its force of 50 N has no direction"
+    with pytest.raises(lw.InputError, match=said):
+        lw.forward_dynamics(pushing, [0.0], None, passive=True)
+    with pytest.raises(lw.InputError, match=f"state 1: {said[1:]}"):
+        lw.joint_loads(pushing, [[0.1], [0.0]], None, passive=True)
+    with pytest.raises(lw.InputError, match=said):
+        lw.simulate(pushing, duration=0.1)
+    assert lw.simulate(pushing, duration=0.1, q0=[1e-3]).attrs["outcome"] == "converged"
+    # Without a force it needs none: a rope that is slack, a damper at rest.
+    for idle in ({"upper": 0, "limit_stiffness": 1e4}, {"damping": 5.0}):
+        slack = model.with_spring("idle", "base", "arm", length=0.5, **at_end, **idle)
+        assert lw.simulate(slack, duration=0.1).attrs["outcome"] == "converged"
+
+
+def test_limits_of_a_spring_without_a_stop_are_told():
+    """A rope whose stiffness was forgotten does nothing."""
+
+    def notes(**properties):
+        model = balanced().with_spring("rope", "base", "arm", length=0.1, **properties)
+        return [note.text for note in model.notes if note.level == "warning"]
+
+    (said,) = notes(upper=0.0)
+    assert said.startswith("upper has no effect, because limit_stiffness is zero; give limit_")
+    assert len(notes(lower=-0.1, upper=0.1, stiffness=10.0)) == 2
+    assert notes(upper=0.0, limit_stiffness=1e4) == notes(stiffness=10.0) == []

@@ -63,7 +63,7 @@ def loads(
     ratings: Annotated[
         Path | None,
         typer.Option(
-            help="TOML file with [rating.JOINT] tables; those of the run's scenario by default."
+            help=r"TOML file with \[rating.JOINT] tables; those of the run's scenario by default."
         ),
     ] = None,
     certify: Annotated[

@@ -36,7 +36,7 @@ AtOption = Annotated[
 ]
 PointOption = Annotated[
     tuple[float, float, float] | None,
-    typer.Option(help="With --at LINK: about this point of it [m] instead of its origin."),
+    typer.Option(help=r"With --at LINK: about this point of it \[m] instead of its origin."),
 ]
 
 

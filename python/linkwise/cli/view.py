@@ -67,7 +67,7 @@ def view(
     ratings: Annotated[
         Path | None,
         typer.Option(
-            help="TOML file with [rating.JOINT] tables; those of the run's scenario by default.",
+            help=r"TOML file with \[rating.JOINT] tables; those of the run's scenario by default.",
             show_default=False,
         ),
     ] = None,

@@ -98,7 +98,8 @@ def derive(load: Array, directions: Array) -> dict[str, Array]:
 
 
 def has_power(run: RunLike) -> bool:
-    return "drive_torque" in run.dataset and "velocity" in run.dataset
+    given = ("drive_torque", "velocity")
+    return any(all(loop + name in run.dataset for name in given) for loop in ("", "loop_"))
 
 
 def drive_power(run: RunLike, found: Selection, where: slice) -> Array:

@@ -41,14 +41,18 @@ def _limited(run: RunLike, model: Model) -> list[tuple[str, int, float, float]]:
         return found
     free = model.loop_property("limit_stiffness") == 0
     low, high = model.loop_property("lower"), model.loop_property("upper")
+    recorded = set(names) if "joint" in run.dataset else set(loops)
     for name, (q, v) in loops.items():
+        if name not in recorded:
+            continue
         dofs = range(v.start, v.stop)
         if len(dofs) == q.stop - q.start:
             found += [
-                (name, first + q.start + k, float(low[dof]), float(high[dof]))
+                (name, first + k, float(low[dof]), float(high[dof]))
                 for k, dof in enumerate(dofs)
                 if free[dof] and np.isfinite([low[dof], high[dof]]).any()
             ]
+        first += q.stop - q.start
     return found
 
 
@@ -64,8 +68,17 @@ def beyond_limits(run: RunLike) -> list[dict[str, Any]]:
     worst = np.zeros(len(limited))
     between = extremes_of(run, "position")
     if between is not None:
-        q = np.stack([between.minimum, between.maximum])[:, columns]
-        when = np.stack([between.minimum_time, between.maximum_time])[:, columns]
+        # Positions of joints that close loops have no extremes between samples.
+        loops = max(columns) + 1 - between.minimum.size
+        padding = ((0, 0), (0, max(loops, 0)))
+        of_all = [
+            np.pad(np.stack(pair), padding, constant_values=np.nan)
+            for pair in (
+                (between.minimum, between.maximum),
+                (between.minimum_time, between.maximum_time),
+            )
+        ]
+        q, when = of_all[0][:, columns], of_all[1][:, columns]
         past = np.maximum(lower - q, q - upper)
         worst_end = np.argmax(past, axis=0), np.arange(len(limited))
         beyond = past[worst_end] > 0

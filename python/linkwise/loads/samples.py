@@ -183,8 +183,8 @@ def blocks(run: RunLike, row_bytes: int) -> Iterator[slice]:
 
 def dof_rows(run: RunLike, name: str, where: slice) -> Array:
     """A variable's rows (time, dof), those of joints that close loops behind those of the tree."""
-    tree, loops = rows(run, name, where), f"loop_{name}"
-    return np.concatenate([tree, rows(run, loops, where)], -1) if loops in run.dataset else tree
+    held = [each for each in (name, f"loop_{name}") if each in run.dataset]
+    return np.concatenate([rows(run, each, where) for each in held], -1)
 
 
 def rows(run: RunLike, name: str, where: slice | Sequence[int]) -> Array:

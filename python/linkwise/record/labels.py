@@ -50,11 +50,14 @@ def _collect(rows: list[tuple[str, str, int]]) -> Scalars:
     return Scalars(text_array(labels), text_array(units), np.array(index, dtype=np.intp))
 
 
-def loop_scalars(model: Model) -> tuple[Scalars, Scalars]:
-    """Coordinates and velocities of all joints that close loops; rods and fixed ones have none."""
+def loop_scalars(model: Model, loops: Sequence[int]) -> tuple[Scalars, Scalars]:
+    """Coordinates and velocities of joints that close loops, given by index, in that order; rods
+    and fixed ones have none."""
+    names, slices = model.loop_names, model.loop_slices
     positions: list[tuple[str, str, int]] = []
     velocities: list[tuple[str, str, int]] = []
-    for loop, (name, (q, v)) in enumerate(zip(model.loop_names, model.loop_slices, strict=True)):
+    for loop in loops:
+        name, (q, v) = names[loop], slices[loop]
         coordinates, rates = model.loop_labels(loop)
         positions += _rows(name, q.start, coordinates[: q.stop - q.start])
         velocities += _rows(name, v.start, rates[: v.stop - v.start])

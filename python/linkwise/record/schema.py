@@ -95,14 +95,15 @@ def resolve_quantities(quantities: Collection[str] | None) -> tuple[str, ...]:
 
 
 def resolve_joints(model: Model, joints: Sequence[str] | None) -> list[int]:
-    """Indices of the joints to record, in the model's order; None means all."""
+    """Indices of the joints to record, in the model's order, those that close loops behind the
+    others; None means all."""
     if joints is None:
-        return list(range(model.n_joints))
+        return list(range(model.n_joints + model.n_loops))
     if isinstance(joints, str):
         joints = [joints]
     if not _is_list(joints) or not all(isinstance(name, str) for name in joints):
         raise InputError(f"joints: {shown(joints)} given; give a list of names of joints")
-    return sorted({model.joint_index(name) for name in joints})
+    return sorted({model.load_index(name) for name in joints})
 
 
 def _dtype(row: Mapping[str, Any]) -> np.dtype[Any]:
@@ -148,13 +149,13 @@ def _joint_variables(
     model: Model, rows: Sequence[Mapping[str, Any]], selected: Sequence[int]
 ) -> tuple[list[Variable], dict[str, Coordinate]]:
     """What is recorded per joint, coordinate or degree of freedom, with its labels."""
-    positions, velocities = joint_scalars(model, selected)
+    of_tree = [k for k in selected if k < model.n_joints]
+    positions, velocities = joint_scalars(model, of_tree)
     joint_names, children = model.joint_names, model.child_link_names  # lists made on every access
-    names = text_array(joint_names[k] for k in selected)
-    loops = range(model.n_joints, model.n_joints + model.n_loops)
+    names = text_array(joint_names[k] for k in of_tree)
     load_names = [*joint_names, *model.loop_names]
     one_each = (
-        not loops
+        not model.n_loops
         and np.array_equal(positions.labels, names)
         and np.array_equal(velocities.labels, names)
     )
@@ -162,12 +163,13 @@ def _joint_variables(
 
     coordinates: dict[str, Coordinate] = {}
     variables: list[Variable] = []
-    everything = len(selected) == model.n_joints
-    loaded = [*selected, *loops] if everything else [*selected]
+    everything = len(selected) == len(load_names)
     for row in rows:
         if row["axis"] == "joints":
-            variables.append(_wrench_variable(row, "joint", loaded, everything))
-            coordinates["joint"] = Coordinate(("joint",), text_array(load_names[k] for k in loaded))
+            variables.append(_wrench_variable(row, "joint", selected, everything))
+            coordinates["joint"] = Coordinate(
+                ("joint",), text_array(load_names[k] for k in selected)
+            )
             coordinates["component"] = Coordinate(("component",), text_array(COMPONENTS))
             units = text_array(["N"] * 3 + ["N m"] * 3)
             coordinates[f"{row['name']}_units"] = Coordinate(("component",), units)
@@ -175,26 +177,33 @@ def _joint_variables(
         on_q = row["axis"] == "coordinates"
         scalars, dim = (positions, q_dim) if on_q else (velocities, v_dim)
         whole = model.nq if on_q else model.nv
+        if not of_tree:  # joints that close loops alone
+            continue
         variables.append(_scalar_variable(row, dim, scalars, whole, coordinates))
         coordinates[dim] = Coordinate((dim,), scalars.labels)
     if "joint" in coordinates:
-        bodies = text_array([*children, *model.loop_child_link_names][k] for k in loaded)
+        bodies = text_array([*children, *model.loop_child_link_names][k] for k in selected)
         about = {"long_name": "outboard body of the joint"}
         coordinates["body"] = Coordinate(("joint",), bodies, about)
     return variables, coordinates
 
 
 def _loop_variables(
-    model: Model, rows: Sequence[Mapping[str, Any]], coordinates: dict[str, Coordinate]
+    model: Model,
+    rows: Sequence[Mapping[str, Any]],
+    selected: Sequence[int],
+    coordinates: dict[str, Coordinate],
 ) -> list[Variable]:
     """Coordinates, rates and drives of joints that close loops, with their labels."""
-    positions, velocities = loop_scalars(model)
+    loops = [k - model.n_joints for k in selected if k >= model.n_joints]
+    positions, velocities = loop_scalars(model, loops)
+    ends = model.loop_slices[-1]
     variables = []
     for row in rows:
         dim = LOOP_AXES[row["axis"]]
-        scalars = positions if row["axis"] == "loop_coordinates" else velocities
-        whole = int(scalars.index.size)
-        if not whole:
+        on_q = row["axis"] == "loop_coordinates"
+        scalars, whole = (positions, ends[0].stop) if on_q else (velocities, ends[1].stop)
+        if not scalars.index.size:
             continue
         variables.append(_scalar_variable(row, dim, scalars, whole, coordinates))
         coordinates[dim] = Coordinate((dim,), scalars.labels)
@@ -220,7 +229,9 @@ def _coupling_variables(
 
 
 def _all_positions(model: Model) -> tuple[Scalars, Scalars]:
-    return joint_scalars(model, range(model.n_joints))[0], loop_scalars(model)[0]
+    return joint_scalars(model, range(model.n_joints))[0], loop_scalars(
+        model, range(model.n_loops)
+    )[0]
 
 
 def _body_variables(
@@ -289,10 +300,10 @@ def build_schema(
     of_joints = [row for row in rows if row["axis"] in ("coordinates", "rates", "joints")]
     if of_joints:  # labels of a million joints take seconds
         variables, coordinates = _joint_variables(model, of_joints, selected)
-    if model.n_loops and len(selected) == model.n_joints:
+    if selected and selected[-1] >= model.n_joints:
         of_loops = [row for row in rows if row["axis"] in LOOP_AXES]
-        variables += _loop_variables(model, of_loops, coordinates)
-    if model.coupling_names and len(selected) == model.n_joints:
+        variables += _loop_variables(model, of_loops, selected, coordinates)
+    if model.coupling_names and len(selected) == model.n_joints + model.n_loops:
         of_couplings = [row for row in rows if row["axis"] == "terms"]
         variables += _coupling_variables(model, of_couplings, coordinates)
     of_bodies = [row for row in rows if row["axis"] == "bodies"]

@@ -233,7 +233,7 @@ class ArgumentBuilder:
         """Names of the joints to record."""
         names = self.source.settings.output.joints
         for name in names or ():
-            self._check_joint(name, ("output", "joints"))
+            self._check_loaded(name, ("output", "joints"))
         return names
 
     # -- drives -----------------------------------------------------------------------------
@@ -304,7 +304,7 @@ class ArgumentBuilder:
         """Ratings by joint name."""
         found = {}
         for joint, section in self.source.settings.rating.items():
-            self._check_joint(joint, ("rating", joint))
+            self._check_loaded(joint, ("rating", joint))
             found[joint] = Rating(**section.model_dump())
         return found
 
@@ -423,9 +423,14 @@ class ArgumentBuilder:
                     f"joint '{shorten(joint)}' closes a loop: this follows from the other joints",
                     "name a joint of the tree",
                 )
-            remedy = near(joint, self.joint_names, "the joints are")
+            remedy = near(joint, [*self.joint_names, *self.loop_names], "the joints are")
             self.source.complain(keys, f"the model has no joint '{shorten(joint)}'", remedy)
         return self.joint_names[joint]
+
+    def _check_loaded(self, joint: str, keys: Sequence[str]) -> None:
+        """A joint that has a load: those that close loops, rods and springs too."""
+        if joint not in self.loop_names:
+            self._check_joint(joint, keys)
 
     def _units(self, joint: str, keys: Sequence[str], *, positions: bool) -> list[str]:
         """Per coordinate or velocity of any joint "rad", "m", "1" or "rad or m"."""

@@ -273,7 +273,7 @@ def _file_beside(path: Path, name: str) -> Path | None:
 
 def _check_same_machine(run: Run, model: Model, file: Path) -> None:
     held = [str(name) for name in run.dataset["joint"].values] if "joint" in run.dataset else []
-    known = model.joint_names
+    known = [*model.joint_names, *model.loop_names]
     for name in held:
         if name not in known:
             raise InputError(

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <optional>
+#include <sstream>
 #include <string>
 
 #include "linkwise/base/error.hpp"
@@ -34,6 +36,33 @@ std::vector<double> with_passive_forces(const Model& m, size_t count, const Batc
   return total;
 }
 
+void require_directions(const Model& m, const LoopStates& states, const double* tau,
+                        const std::string& where) {
+  constexpr double meets = 1e-9, noise = 1e-6;
+  std::vector<double> force;
+  for (int l = 0; l < m.n_loops(); ++l) {
+    const LoopJoint& loop = m.loops.joints[l];
+    if (loop.kind != LoopKind::spring) continue;
+    const double reach = states[l].length;
+    if (states.q()[loop.joint.q] + loop.length > meets * reach) continue;
+    if (force.empty()) {  // of springs and stops alone: those of dampers vanish at rest
+      force.assign(m.loops.nv, 0.0);
+      const std::vector<double> rest(m.loops.nv);
+      add_passive_forces(m.loops, states.q().data(), rest.data(), force.data());
+    }
+    const int i = loop.joint.v;
+    const auto at = [&](DofProperty p) { return m.loops.dof[static_cast<int>(p)][i]; };
+    const double pull = force[i] + (tau ? tau[i] : 0),
+                 stiff = at(DofProperty::stiffness) + at(DofProperty::limit_stiffness);
+    if (!(std::abs(pull) > noise * stiff * reach)) continue;
+    std::ostringstream text;
+    text << where << "spring '" << loop.joint.name << "'" << m.where()
+         << ": its ends meet, so that its force of " << std::setprecision(3) << std::abs(pull)
+         << " N has no direction; take a position beside it, or give it a length of 0";
+    throw InputError(text.str());
+  }
+}
+
 /// What joints that close loops add to a state's input. InputError where it leaves one open.
 class AppliedStates::Loops final : public LoopListener {
  public:
@@ -59,6 +88,7 @@ class AppliedStates::Loops final : public LoopListener {
     if (!passive_) return;
     tau_.assign(model_.loops.nv, 0.0);
     if (in.loop_tau) std::copy_n(in.loop_tau, tau_.size(), tau_.begin());
+    require_directions(model_, loops, in.loop_tau, where);
     add_passive_forces(model_.loops, loops.q().data(), loops.v().data(), tau_.data());
     in.loop_tau = tau_.data();
   }

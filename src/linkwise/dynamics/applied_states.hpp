@@ -1,9 +1,11 @@
 #pragma once
 // States of a model as they come from outside, with all that acts on them.
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "linkwise/dynamics/batch.hpp"
+#include "linkwise/kinematics/loop_states.hpp"
 #include "linkwise/kinematics/sweep_input.hpp"
 
 namespace linkwise {
@@ -15,6 +17,12 @@ void check_states(const Model& model, size_t count, const BatchInput& states);
 /// tau [count][nv], null for none, with the model's passive forces in the states added.
 std::vector<double> with_passive_forces(const Model& model, size_t count, const BatchInput& states,
                                         const double* tau);
+
+/// InputError naming a spring whose ends meet though it is longer than that, so that its force has
+/// no direction. tau: what else acts along the coordinates of loop joints, or null; `where`: begins
+/// the message.
+void require_directions(const Model& model, const LoopStates& states, const double* tau,
+                        const std::string& where = "");
 
 /// Rates and torques that were left out are zero, the model's passive forces are among the torques
 /// where they act. The arrays of `states` must outlive it. InputError as check_states().

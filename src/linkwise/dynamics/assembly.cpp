@@ -164,8 +164,32 @@ std::string in_full(double x) {
 /// What has to be added to a length so that links meet: slightly more, to leave the dead end.
 double enough(double missing) { return 1.001 * missing; }
 
+/// What may be left out of a machine to see whether the rest can be assembled: couplings first,
+/// then joints that were given as loops.
+struct Removable {
+  explicit Removable(const ModelSpec& spec, bool loops) {
+    for (const CouplingSpec& c : spec.couplings) couplings.push_back(c.name);
+    if (!loops) return;
+    for (const LoopJointSpec& l : spec.loop_joints)
+      if (l.kind != LoopKind::spring) joints.push_back(l.joint.name);
+  }
+  std::vector<std::string> couplings, joints;
+  size_t size() const { return couplings.size() + joints.size(); }
+};
+
+ModelSpec without(ModelSpec spec, const std::string& name, bool coupling) {
+  if (coupling) {
+    std::erase_if(spec.couplings, [&](const CouplingSpec& c) { return c.name == name; });
+  } else {
+    std::erase_if(spec.loop_joints, [&](const LoopJointSpec& l) { return l.joint.name == name; });
+    std::erase_if(spec.bearings, [&](const BearingSpec& b) { return b.joint == name; });
+  }
+  return spec;
+}
+
 bool closes(ModelSpec spec, std::vector<double> q, const LoopMotion& given) {
   const Model model(std::move(spec));
+  if (model.n_loops() + model.n_couplings() == 0) return true;
   Closing closing(model);
   closing.loops().give(given);
   return closing.close(q);
@@ -214,41 +238,79 @@ std::string tried_offset(const Model& model, size_t coupling, double offset,
   return "give it the offset " + in_full(offset) + ", which closes it, or ";
 }
 
-[[noreturn]] void refuse_coupling(const Model& model, const LoopStates& states,
-                                  const std::vector<double>& q, const LoopMotion& given) {
-  size_t worst = 0;
-  double largest = -1;
-  const CoupledState at = coupled_state(q.data(), nullptr, states);
-  for (size_t c = 0; c < model.couplings.size(); ++c)
-    if (const double gap = std::abs(miss_of(model.couplings[c], at).gap); gap > largest) {
-      largest = gap;
-      worst = c;
-    }
-  const Coupling& coupling = model.couplings[worst];
-  const double gap = miss_of(coupling, at).gap;
-  throw InputError("coupling '" + coupling.name + "'" + model.where() +
-                   " cannot be kept: at best its coordinates add up to " + rounded(gap) +
-                   " beside its offset; " +
-                   tried_offset(model, worst, coupling.offset + enough(gap), q, given) +
+/// Couplings and loop joints that contradict each other: with any one of them left out, the others
+/// can be kept. "couplings 'c' and 'd'"; empty: no coupling is among them, or there are too many to
+/// try.
+std::string contradicting_couplings(const Model& model, const LoopMotion& given,
+                                    const std::vector<double>& q) {
+  constexpr size_t most_tried = 40;
+  const bool motions = std::any_of(model.loops.elements.begin(), model.loops.elements.end(),
+                                   [](const Element& e) { return e.prescribed; });
+  const Removable all(model.spec(), !motions);  // given motions count all loop joints
+  if (all.couplings.empty() || all.size() > most_tried) return "";
+  ModelSpec rest = model.spec();
+  const auto needed = [&](const std::vector<std::string>& names, bool coupling) {
+    std::vector<std::string> kept;
+    for (const std::string& name : names) try {
+        ModelSpec less = without(rest, name, coupling);
+        if (closes(less, q, motions ? given : LoopMotion{}))
+          kept.push_back("'" + name + "'");
+        else
+          rest = std::move(less);
+      } catch (const InputError&) {  // something else asks for it
+      }
+    return kept;
+  };
+  const auto joints = needed(all.joints, false), couplings = needed(all.couplings, true);
+  if (couplings.empty()) return "";
+  const auto list = [](const char* kind, const std::vector<std::string>& names) {
+    std::string text = std::string(kind) + (names.size() > 1 ? "s " : " ");
+    for (size_t k = 0; k < names.size(); ++k)
+      text += (k == 0 ? "" : k + 1 < names.size() ? ", " : " and ") + names[k];
+    return text;
+  };
+  return list("coupling", couplings) + (joints.empty() ? "" : " and " + list("joint", joints));
+}
+
+/// Where no position near q keeps a coupling: which, and what they are in conflict with.
+void refuse_couplings(const Model& model, const LoopStates& states, const LoopMotion& given,
+                      const std::vector<double>& q) {
+  const Coupling* worst = nullptr;
+  CouplingMiss largest{};
+  for (const Coupling& coupling : model.couplings) {
+    const CouplingMiss miss = miss_of(coupling, coupled_state(q.data(), nullptr, states));
+    if (is_kept(miss) || std::abs(miss.gap) <= std::abs(largest.gap)) continue;
+    worst = &coupling;
+    largest = miss;
+  }
+  std::string who = contradicting_couplings(model, given, q);
+  const bool several = who.find("' and ") != std::string::npos;
+  if (!worst && !several) return;  // a loop is open that could not be left out
+  if (who.empty()) who = "coupling '" + worst->name + "'";
+  if (several)
+    throw InputError(who + model.where() +
+                     " contradict each other: no position near the start keeps them all; change "
+                     "factors or offsets, hold fewer joints, or start from another position");
+  const auto at = static_cast<size_t>(worst - model.couplings.data());
+  throw InputError(who + model.where() +
+                   ": no position near the start keeps it; at best its coordinates add up to " +
+                   rounded(largest.gap) + " beside its offset; " +
+                   tried_offset(model, at, worst->offset + enough(largest.gap), q, given) +
                    "change its factors, hold fewer joints, or start from another position");
 }
 
 [[noreturn]] void refuse_position(const Model& model, const LoopStates& states,
-                                  const std::vector<double>& q, const LoopMotion& motion) {
-  try {
-    require_coupled(model, states, q.data(), nullptr);
-  } catch (const InputError&) {
-    refuse_coupling(model, states, q, motion);
-  }
+                                  const LoopMotion& motion, const std::vector<double>& q) {
+  refuse_couplings(model, states, motion, q);
   const int l = widest(model, states, false);
   const LoopJoint& loop = model.loops.joints[l];
   const LoopMiss miss = miss_of(states[l], states[l].gap);
   const auto link = [&](int k) {
     return k >= 0 ? "'" + model.links[k].name + "'" : std::string("the ground");
   };
-  const std::string given = contradiction(model, states, l);
-  if (!given.empty())
-    throw InputError(given + ": at best it is open by " + rounded(1e3 * miss.shift) + " mm and " +
+  const std::string motions = contradiction(model, states, l);
+  if (!motions.empty())
+    throw InputError(motions + ": at best it is open by " + rounded(1e3 * miss.shift) + " mm and " +
                      rounded(miss.turn) + " rad between " + link(loop.parent_link) + " and " +
                      link(loop.joint.link) +
                      "; drive one of them, hold fewer joints, or start from another position");
@@ -327,12 +389,64 @@ Assembly assemble(const Model& model, std::vector<double> q, std::vector<double>
     const bool done = closing.close(out.q);
     if (!done && n > 0) continue;
     closing.loops().gap(out.q.data());
-    if (!done) refuse_position(own, closing.loops().states(), out.q, given);
+    if (!done) refuse_position(own, closing.loops().states(), given, out.q);
     make_consistent(own, closing.loops(), out.q, out.v);
     out.released.assign(hold.begin() + static_cast<std::ptrdiff_t>(n), hold.end());
     out.moved = changes(model, q, out.q);
     return out;
   }
+}
+
+std::string changed_rates(const Model& model, const double* asked, const double* got) {
+  double fastest = 0;
+  for (int i = 0; i < model.nv(); ++i) fastest = std::max(fastest, std::abs(asked[i]));
+  std::string text;
+  for (const JointInfo& joint : model.joints) {
+    int most = joint.v;
+    double largest = 0;
+    for (int i = joint.v; i < joint.v + joint.nv; ++i)
+      if (const double change = std::abs(got[i] - asked[i]); change > largest) {
+        largest = change;
+        most = i;
+      }
+    if (!(largest > consistent * (1 + fastest))) continue;
+    text += (text.empty() ? "'" : ", '") + joint.name + "' is " + rounded(got[most]) +
+            " instead of " + rounded(asked[most]);
+  }
+  return text;
+}
+
+/// A little way along rates that open no loop, loops are open by the square of it. Where the
+/// machine can move, closing them takes as little; where it cannot, closing them leads back.
+bool can_go_on(const Model& model, LoopProjection& loops, const double* q, const double* given) {
+  constexpr double way = 1e-5, tangent = 1e-6, back = 0.5;
+  constexpr int most = 40;
+  std::vector<double> rates(model.nv()), moved(q, q + model.nq());
+  for (const Element& e : model.elements)
+    for (int i = e.v; i < e.v + e.nv && !e.prescribed; ++i)
+      rates[i] = given ? given[i] : std::cos(2.4 * i);
+  const auto size = [&] {
+    double largest = 0;
+    for (const double x : rates) largest = std::max(largest, std::abs(x));
+    return largest;
+  };
+  const double before = size();
+  loops.stop(q, weakest[0], rates.data());
+  const double largest = size();
+  if (!(largest > tangent * before)) return true;  // it stands still, and loops hold it
+  for (double& x : rates) x *= way / largest;
+  move_by(model, rates.data(), moved.data());
+  std::vector<double> at = moved;
+  for (int k = 0; k < most && loops.gap(at.data()) > closed; ++k) {
+    if (!loops.close(at.data(), weakest[0], rates.data())) return true;  // nothing is known
+    move_by(model, rates.data(), at.data());
+  }
+  double apart = 0, went = 0;
+  for (int i = 0; i < model.nq(); ++i) {
+    apart += (at[i] - moved[i]) * (at[i] - moved[i]);
+    went += (moved[i] - q[i]) * (moved[i] - q[i]);
+  }
+  return !(apart > back * back * went);
 }
 
 std::string contradicting_motions(const Model& model, const LoopStates& states) {

@@ -24,9 +24,19 @@ struct Assembly {
 Assembly assemble(const Model& model, std::vector<double> q, std::vector<double> v,
                   const std::vector<std::string>& hold, const LoopMotion& given = {});
 
+/// "'a' is 1.64 instead of 1, ...", of every joint whose rates got changed by more than rounding;
+/// of its degrees of freedom the one that changed most.
+std::string changed_rates(const Model& model, const double* asked, const double* got);
+
 /// InputError naming the loop where q and v leave one open.
 void require_assembled(const Model& model, const std::vector<double>& q,
                        const std::vector<double>& v, const LoopMotion& given = {});
+
+/// Whether a machine can go on from q, which closes its loops, by rates [nv] that open none at
+/// first; null: by any such rates. A triangle that is folded flat cannot: its loops hold it there,
+/// but by no finite force.
+bool can_go_on(const Model& model, LoopProjection& loops, const double* q,
+               const double* rates = nullptr);
 
 /// "motions of 'a' and 'c' contradict each other through the loop that joint 'x' closes", of the
 /// loop that is open the widest among those with joints of given motion; empty: there is none.

@@ -78,9 +78,10 @@ class Choice {
   }
 
   /// What is lost if a joint is left out, the most important first.
-  std::tuple<bool, bool, int, int, int> price(int j) const {
+  std::tuple<bool, bool, bool, int, int, int> price(int j) const {
     const auto& joint = graph_.joints[j];
-    return {joint.stays, joint.acts, -joint.freedom, -depth_[joint.parent], -j};
+    const bool rigid = joint.freedom == 0;
+    return {joint.stays, rigid, joint.acts, -joint.freedom, -depth_[joint.parent], -j};
   }
 
   const MachineGraph& graph_;

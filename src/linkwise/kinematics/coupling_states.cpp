@@ -23,7 +23,7 @@ void require_coupled(const Model& model, const LoopStates& loops, const double* 
   for (const Coupling& coupling : model.couplings) {
     const CouplingMiss miss = miss_of(coupling, coupled_state(q, v, loops));
     const auto name = [&] { return where + "coupling '" + coupling.name + "'" + model.where(); };
-    if (!(std::abs(miss.gap) <= allowed * (1 + miss.size)))
+    if (!is_kept(miss))
       throw InputError(name() + ": its coordinates add up to " + rounded(miss.gap) +
                        " beside its offset; give q that keeps it");
     if (!(std::abs(miss.slip) <= allowed * (1 + miss.speed)))

@@ -43,6 +43,12 @@ inline CouplingMiss miss_of(const Coupling& coupling, const CoupledState& at) {
   return out;
 }
 
+/// Whether a state has the coupling's coordinates beside its offset by no more than a millionth.
+inline bool is_kept(const CouplingMiss& miss) {
+  constexpr double allowed = 1e-6;
+  return std::abs(miss.gap) <= allowed * (1 + miss.size);
+}
+
 /// InputError naming the first coupling that a state misses by more than a millionth. v may be
 /// null; `loops`: at the same state; `where`: begins the message.
 void require_coupled(const Model& model, const LoopStates& loops, const double* q, const double* v,

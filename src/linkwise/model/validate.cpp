@@ -115,6 +115,7 @@ void validate(ModelSpec& spec, std::vector<Note>& notes) {
   for (LoopJointSpec& loop : spec.loop_joints) {
     validate_joint(loop.joint, where);
     note_idle(loop.joint, notes);
+    if (loop.kind == LoopKind::spring) note_idle_limits(loop.joint, notes);
     const std::string head = "joint '" + loop.joint.name + "'" + where + ": ";
     if (!finite(loop.child_translation))
       throw InputError(head + "child_translation is not finite; give three finite numbers in m");
@@ -182,6 +183,16 @@ void note_idle(const JointSpec& joint, std::vector<Note>& notes) {
   }
   if (stiff && !ranged)
     warn("limit_stiffness has no effect, because the range has no ends; give lower or upper");
+}
+
+void note_idle_limits(const JointSpec& spring, std::vector<Note>& notes) {
+  if (value_of(spring, DofProperty::limit_stiffness, 0) > 0) return;
+  for (const DofProperty limit : {DofProperty::lower, DofProperty::upper})
+    if (std::isfinite(value_of(spring, limit, 0)))
+      notes.push_back({NoteLevel::warning, spring.name,
+                       std::string(dof_property_table[static_cast<int>(limit)].name) +
+                           " has no effect, because limit_stiffness is zero; give limit_stiffness, "
+                           "that of the rope or the stop"});
 }
 
 void validate_link(const LinkSpec& link, const std::string& where, std::vector<Note>& notes) {

@@ -30,6 +30,8 @@ void validate_joint(JointSpec& joint, const std::string& where);
 
 /// Adds a warning note on each property that does nothing because another one is missing.
 void note_idle(const JointSpec& joint, std::vector<Note>& notes);
+/// The same of the limits of a spring between two points, which are for its stops alone.
+void note_idle_limits(const JointSpec& spring, std::vector<Note>& notes);
 
 /// Appends the joint's properties, one value per degree of freedom, to the model's arrays. Throws
 /// InputError on values of the wrong number or sign, or limits that are swapped.

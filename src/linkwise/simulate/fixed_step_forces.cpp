@@ -180,7 +180,8 @@ ForceDoubt FixedStepForces::worst() const {
   ForceDoubt out;
   double ratio = doubtful;
   for (const Row& row : rows_)
-    if (row.error > ratio * row.largest && row.error > no_acceleration * row.inertia) {
+    if (row.error > ratio * row.largest && row.error > no_acceleration * row.inertia &&
+        row.error > no_force(*setup_.model, row)) {
       ratio = row.error / row.largest;
       out = {&row, row.error, row.largest, row.time};
       // Errors go with the square of the step, once it is of the size of what moves.

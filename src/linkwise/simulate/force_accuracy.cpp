@@ -311,7 +311,7 @@ std::string ForceAccuracy::doubt() const {
   double ratio = doubtful;
   for (const Row& row : rows_)
     if (row.largest > 0 && row.error > ratio * row.largest &&
-        row.error > no_acceleration * row.at_start)
+        row.error > no_acceleration * row.at_start && row.error > no_force(*setup_.model, row))
       ratio = row.error / row.largest, worst = &row;
   if (!worst) return {};
   const ForceDoubt found{worst, worst->error, worst->largest, worst->error_time};

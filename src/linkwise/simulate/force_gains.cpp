@@ -1,7 +1,9 @@
 #include "linkwise/simulate/force_gains.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <string_view>
 
 #include "linkwise/forces/coordinate_forces.hpp"
 #include "linkwise/kinematics/loop_states.hpp"
@@ -63,6 +65,25 @@ Contact contact(const GainRow& row, double q, double v) {
 
 double stop_stiffness(const GainRow& row, double speed) {
   return row.stop * std::max(0.0, 1 + row.stop_damping * speed);
+}
+
+double no_force(const Model& model, const GainRow& row) {
+  constexpr double share = 1e-10;
+  const Vec3<double>& g = model.gravity;
+  const double force = share * model.total_mass() * std::sqrt(dot(g, g));
+  if (std::string_view(row.unit) == "N") return force;
+  std::vector<double> reach(model.n_bodies());
+  double farthest = 0;
+  for (int n = 0; n < model.n_bodies(); ++n) {
+    const BodyTopology& body = model.topology[n];
+    if (body.parent >= 0) reach[n] = reach[body.parent];
+    for (int i = 0; i < body.n_elements; ++i) {
+      const Vec3<double>& r = model.elements[body.first_element + i].placement.r;
+      reach[n] += std::sqrt(dot(r, r));
+    }
+    farthest = std::max(farthest, reach[n]);
+  }
+  return force * farthest;
 }
 
 std::string ForceDoubt::text(const Model& model) const {

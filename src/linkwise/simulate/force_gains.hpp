@@ -37,6 +37,10 @@ double stop_stiffness(const GainRow& row, double speed);
 /// Of m/s^2 or rad/s^2: what gives an inertia no more than that is no force to be known.
 constexpr double no_acceleration = 1e-9;
 
+/// A force or a moment that rounding alone may make of the machine's weight, which shows where it
+/// falls freely and its joints carry nothing.
+double no_force(const Model& model, const GainRow& row);
+
 /// A force that is not known well.
 struct ForceDoubt {
   const GainRow* row = nullptr;

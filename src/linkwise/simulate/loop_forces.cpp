@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "linkwise/dynamics/applied_states.hpp"
 #include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/forces/passive.hpp"
 
@@ -69,6 +70,11 @@ void LoopForces::evaluate(double t, const double* q, const double* v) {
 void LoopForces::accepted(double t, const double* q, const double* v) {
   update(t, q, v);
   near_q_ = states_.q();
+}
+
+/// Drives are not asked: their functions may be the caller's.
+void LoopForces::require_directions() const {
+  if (passive_) linkwise::require_directions(*setup_.model, states_, nullptr);
 }
 
 void LoopForces::add_holding_torques(const double* loads) {

@@ -30,6 +30,8 @@ class LoopForces {
   /// The same without forces, whose functions may be the caller's.
   void update(double t, const double* q, const double* v);
   void accepted(double t, const double* q, const double* v);
+  /// InputError where a spring of the state seen last has a force and no direction.
+  void require_directions() const;
 
   const double* tau() const { return tau_.data(); }      ///< [nv] of loop joints
   const double* drive() const { return drive_.data(); }  ///< the drives' share

@@ -1,5 +1,6 @@
 #include "linkwise/simulate/simulation.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -43,8 +44,13 @@ void Simulation::start(double t0, const Start& start) {
   y_.insert(y_.end(), start.v, start.v + members_ * nv());
   impose(t0, y_.data());
   for (size_t i = 0; i < members_; ++i) check_quaternions(m, y_.data() + i * nq());
+  const std::vector<double> asked = y_;
   close_loops(t0, start.hold);
-  if (LoopForces* loops = forces_->loops()) loops->accepted(t0, y_.data(), rates_in(y_.data()));
+  if (loops_) check_start(t0, rates_in(asked.data()));
+  if (LoopForces* loops = forces_->loops()) {
+    loops->accepted(t0, y_.data(), rates_in(y_.data()));
+    loops->require_directions();
+  }
   start_state_ = y_;
   endings_.assign(members_, {Outcome::converged, t0, "", ""});
   failure_ = {};
@@ -82,6 +88,28 @@ void Simulation::start(double t0, const Start& start) {
   integrator_->start(t0, y);
   integrator_->interpolate(t0, y);
   watch_start(t0, y.data());
+}
+
+/// Tells what closing loops did to the rates that were asked for. Refuses a start at rest where
+/// forces of loops have no bound.
+void Simulation::check_start(double t0, const double* asked) {
+  const double* got = rates_in(y_.data());
+  if (const std::string changed = changed_rates(model(), asked, got); !changed.empty())
+    assembled_ += (assembled_.empty() ? "" : "; ") +
+                  ("rates that keep loops closed are not those asked for: " + changed);
+  const bool rests = std::all_of(got, got + nv(), [](double rate) { return rate == 0; });
+  if (!rests || can_go_on(setup_->driven(), *loops_, y_.data())) return;
+  du_.resize(nv());
+  if (accelerations(output_method_.get(), t0, y_.data(), du_.data(), nullptr) != Outcome::converged)
+    return;
+  constexpr double noise = 1e-9;  // rad/s2, m/s2
+  const bool pushed =
+      std::any_of(du_.begin(), du_.end(), [](double x) { return std::abs(x) > noise; });
+  if (pushed && !can_go_on(setup_->driven(), *loops_, y_.data(), du_.data()))
+    throw InputError("simulation of '" + model().spec().name + "'" + model().where() +
+                     " starts at rest in a singular position that it cannot leave, as that of a "
+                     "triangle folded flat, and is pushed to: loads of its loops have no bound; "
+                     "change lengths or places of joints, or let a stiff spring stand for a rod");
 }
 
 void Simulation::make_methods(double t0) {

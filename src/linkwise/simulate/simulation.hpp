@@ -137,6 +137,7 @@ class Simulation : private OdeSystem {
   void watch_evaluation(double t, const double* y, const double* ydot);
   void watch_step(double t, const double* y);
   void close_loops(double t0, const std::vector<std::string>& hold);
+  void check_start(double t0, const double* asked);
   void begin_coasting();
   bool follows_error_test() const;
   SweepInput<double> input(double t, const double* q, const double* v);

@@ -77,6 +77,16 @@ TEST(SpanningForest, AFourBarIsCutWhereItIsCheapest) {
   EXPECT_EQ(forest.loop_joints, Indices{1});
 }
 
+TEST(SpanningForest, FixedJointsStayWhateverElseActs) {
+  // ground - 1 = 3 (the frame at its other end), ground - 2 - 3.
+  MachineGraph graph = graph_of(4, {{0, 1}, {0, 2}, {1, 3, 0, false, true}, {2, 3, 1, true}});
+  graph.massless[3] = 1;
+  const SpanningForest forest = make_spanning_forest(graph);
+  check_forest(graph, forest);
+  EXPECT_EQ(forest.loop_joints, Indices{3});
+  EXPECT_EQ(make_lumps(graph, forest).lead[3], 1);
+}
+
 TEST(SpanningForest, ALoopIsCutFarFromTheGround) {
   // Two legs of two and of three links that meet at link 5, the longer one given first.
   const MachineGraph graph = graph_of(6, {{0, 1}, {1, 2}, {2, 5}, {0, 3}, {3, 5}, {5, 4}});

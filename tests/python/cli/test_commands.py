@@ -1,6 +1,7 @@
 """What the commands print, write and return."""
 
 import os
+import re
 import sys
 
 import numpy as np
@@ -242,3 +243,19 @@ def test_progress_line():
     assert line == "t = 2.500 of 10 s   0.5 x real time   0:15 left"
     assert "-:--" in describe(Progress(0.0, 10.0, 0.1, 0, 0))
     assert "1:23:20 left" in describe(Progress(1.0, 2.0, 5000.0, 0, 0))
+
+
+def test_helps_show_what_stands_in_square_brackets(linkwise):
+    """Which the terminal takes for markup, unless it is told otherwise."""
+    import typer.main
+
+    from linkwise.cli.main import app
+
+    told = 0
+    for name, command in typer.main.get_command(app).commands.items():
+        shown = " ".join(linkwise(name, "--help").out.replace("│", " ").split())
+        for option in command.params:
+            for bracket in re.findall(r"\[[^\]]*\]", getattr(option, "help", None) or ""):
+                told += 1
+                assert bracket in shown, (name, bracket)
+    assert told >= 2
