@@ -31,7 +31,8 @@ TARGETS: tuple[str, ...]
 ARRAYS = (
     "acceleration axes axis breakpoints child_point child_rotation child_translation com "
     "directions external f gravity guess inertia initial point loop_prescribed "
-    "loop_tau offset origin preload prescribed q q0 rotation target tau times translation turn v v0 value values"
+    "loop_tau offset origin preload prescribed q q0 rotation target tau times translation turn "
+    "v v0 value values"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "arg": "Any",  # without a name: what pickling has kept
