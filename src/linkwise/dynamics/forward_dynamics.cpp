@@ -200,17 +200,13 @@ std::string rounded(double x) {
   return text.str();
 }
 
-/// On shorter chains the pieces are too short to pay for the cut system
-/// (benchmarks/cpp/crossovers.cpp).
-constexpr int piecewise_from = 64;
-
 void choose_for_loops(const Model& model, Choice& choice) {
   if (!model.bearings.empty()) {
     choice.method = "articulated_body";
     choice.reason = "closed loops, whose bearings share loads in the recursion alone";
     return;
   }
-  if (model.n_bodies() >= piecewise_from && Piecewise::closes_cheaply(model)) {
+  if (Piecewise::closes_cheaply(model)) {
     choice.method = "piecewise";
     choice.reason = "a revolute chain of " + std::to_string(model.n_bodies()) +
                     " bodies: its pieces fill the SIMD lanes, and the loops close where pieces end";
@@ -244,7 +240,7 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
       choice.reason = "a solver was asked for, and only constraint_force uses one";
     } else if (model.is_constrained()) {
       choose_for_loops(model, choice);
-    } else if (model.n_bodies() >= piecewise_from && Piecewise::suits(model)) {
+    } else if (model.n_bodies() >= Piecewise::worth_cutting && Piecewise::suits(model)) {
       choice.method = "piecewise";
       choice.reason = "a revolute chain of " + std::to_string(model.n_bodies()) +
                       " bodies: its pieces fill the SIMD lanes";

@@ -45,13 +45,16 @@ LoopProjection::LoopProjection(const Model& model, bool by_graph)
       du_(model.nv()) {
   if (by_graph)
     graph_ = std::make_unique<LoopedConstraintForce>(model, DynamicsOptions{});
+  else if (Piecewise::closes_cheaply(model))
+    pieces_ = std::make_unique<Piecewise>(model, DynamicsOptions{});
   else
     recursion_ = std::make_unique<ArticulatedLoops>(model);
 }
 
 bool LoopProjection::respond(const double* q, double least, double* du) {
-  return graph_ ? graph_->respond(q, asked_.data(), du)
-                : recursion_->respond(q, asked_.data(), least, du);
+  if (graph_) return graph_->respond(q, asked_.data(), du);
+  return pieces_ ? pieces_->respond(q, asked_.data(), least, du)
+                 : recursion_->respond(q, asked_.data(), least, du);
 }
 
 LoopReport LoopProjection::report_at(const double* q) {
@@ -96,7 +99,7 @@ double LoopProjection::miss(const double* q, const double* v) {
   const bool of_rates = v != nullptr;
   double sum = 0;
   for (int l = 0; l < model_.n_loops(); ++l) {
-    const LoopState& loop = states_[l];
+    const LoopState& loop = (*at_)[l];
     const double* residual = of_rates ? loop.slip : loop.gap;
     const LoopMiss miss = miss_of(loop, residual);
     sum += std::pow(miss.shift / loop.length, 2) + std::pow(miss.turn, 2);
@@ -104,7 +107,7 @@ double LoopProjection::miss(const double* q, const double* v) {
   }
   for (int c = 0; c < model_.n_couplings(); ++c) {
     const Coupling& coupling = model_.couplings[c];
-    const CouplingMiss miss = miss_of(coupling, coupled_state(q, v, states_));
+    const CouplingMiss miss = miss_of(coupling, coupled_state(q, v, *at_));
     const double residual = of_rates ? miss.slip : miss.gap;
     sum += residual * residual;
     asked_[6 * static_cast<size_t>(model_.n_loops()) + c] = -residual;
@@ -112,17 +115,20 @@ double LoopProjection::miss(const double* q, const double* v) {
   return std::sqrt(sum);
 }
 
-SweepInput<double> LoopProjection::input(const double* q, const double* v) const {
+void LoopProjection::find_states(const double* q, const double* v) {
   SweepInput<double> in;
   in.q = q;
   in.v = v;
   in.loop_q = given_.q;
   in.loop_v = given_.v;
-  return in;
+  if (pieces_)
+    at_ = &pieces_->find_loops(in);
+  else
+    states_.update(in);
 }
 
 double LoopProjection::gap(const double* q) {
-  states_.update(input(q, nullptr));
+  find_states(q, nullptr);
   return miss(q, nullptr);
 }
 
@@ -131,7 +137,7 @@ bool LoopProjection::close(const double* q, double least, double* du) {
 }
 
 double LoopProjection::slip(const double* q, const double* v) {
-  states_.update(input(q, v));
+  find_states(q, v);
   return miss(q, v);
 }
 

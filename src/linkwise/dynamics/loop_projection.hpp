@@ -12,6 +12,7 @@
 #include "linkwise/base/outcome.hpp"
 #include "linkwise/dynamics/articulated_loops.hpp"
 #include "linkwise/dynamics/looped_constraint_force.hpp"
+#include "linkwise/dynamics/piecewise.hpp"
 
 namespace linkwise {
 
@@ -56,8 +57,10 @@ class LoopProjection {
   /// The same as it is, without a change.
   double slip(const double* q, const double* v);
 
-  const LoopStates& states() const { return states_; }
-  const LoopReport& report() const { return graph_ ? graph_->report() : recursion_->report(); }
+  const LoopStates& states() const { return *at_; }
+  const LoopReport& report() const {
+    return graph_ ? graph_->report() : pieces_ ? pieces_->loop_report() : recursion_->report();
+  }
 
  private:
   double miss(const double* q, const double* v);
@@ -65,12 +68,14 @@ class LoopProjection {
   bool respond(const double* q, double least, double* du);
   double least_to_close(int stage, double open) const;
 
-  SweepInput<double> input(const double* q, const double* v) const;
+  void find_states(const double* q, const double* v);
 
   const Model& model_;
   LoopMotion given_;
   LoopStates states_;
+  const LoopStates* at_ = &states_;              ///< of the last state: these or the pieces'
   std::unique_ptr<ArticulatedLoops> recursion_;  ///< or
+  std::unique_ptr<Piecewise> pieces_;            ///< of a long chain, or
   std::unique_ptr<LoopedConstraintForce> graph_;
   std::vector<double> asked_;
   int full_ = 0, at_start_ = 0, n_faint_ = 0;

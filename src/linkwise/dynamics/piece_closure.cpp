@@ -100,8 +100,8 @@ void PieceClosure::place_forces(std::span<const ClosedPiece> pieces, const Motio
     for (int i = 0; i < member.n_rows; ++i) {
       const int j = member.row + i;
       const Force<double> Q = direction(loop.row[i]);
-      r_[j] = loop.r[i];
-      size_[j] = std::abs(loop.r[i]);
+      r_[j] = asked_ ? asked_[6 * member.loop + i] : loop.r[i];
+      size_[j] = std::abs(r_[j]);
       const auto add = [&](int s, const Force<double>& wrench, const double* free) {
         double part = 0;
         if (s < 0) {
@@ -186,7 +186,7 @@ void PieceClosure::factor(bool with_loads) {
     }
     metric_.calc(member.loop, loop, system_->metric(m));
   }
-  system_->factor(null_pivot(gap), with_loads);
+  system_->factor(asked_ ? null_ : null_pivot(gap), with_loads);
   report_.rows = group_.rows - group_.rotors;
   report_.rank = system_->rank() - group_.rotors;
   report_.strong = system_->rank_above(weak_pivot) - group_.rotors;

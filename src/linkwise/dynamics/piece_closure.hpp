@@ -60,9 +60,16 @@ class PieceClosure {
   const double* pushed(int piece) const {
     return port_of_[piece] < 0 ? nullptr : &push_[6 * static_cast<size_t>(port_of_[piece])];
   }
+  /// From now on rows ask for these numbers [n_loops][6], and pivots below `null` are zero; null
+  /// pointer: for what the rates ask.
+  void ask(const double* asked, double null) {
+    asked_ = asked;
+    null_ = null;
+  }
   /// loads [n_loops][6].
   void store_loads(double* loads) const;
   const LoopReport& report() const { return report_; }
+  const LoopStates& states() const { return states_; }
 
  private:
   /// Pieces that the bodies of a loop joint end; -1: ground.
@@ -100,6 +107,8 @@ class PieceClosure {
   };
   std::vector<Driven> driven_;
   LoopReport report_;
+  const double* asked_ = nullptr;
+  double null_ = 0;
 };
 
 }  // namespace linkwise

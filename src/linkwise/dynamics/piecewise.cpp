@@ -17,7 +17,8 @@ class PiecewiseChain {
   virtual ~PiecewiseChain() = default;
   virtual DynamicsReport evaluate(const SweepInput<double>& in, double* du, double* loads) = 0;
   virtual std::span<const double> constraint_force() const = 0;
-  virtual bool finds_loops() const = 0;
+  virtual const LoopStates& find_loops(const SweepInput<double>& in) = 0;
+  virtual PieceClosure* closure() = 0;  ///< null: no loops
 };
 
 namespace {
@@ -64,15 +65,17 @@ class Chain final : public PiecewiseChain {
     }
   }
 
-  bool finds_loops() const override { return closes; }
+  PieceClosure* closure() override { return closes ? &*closure_ : nullptr; }
+
+  const LoopStates& find_loops(const SweepInput<double>& in) override {
+    in_ = in;
+    place_pieces();
+    return closure_->states();
+  }
 
   DynamicsReport evaluate(const SweepInput<double>& given, double* du, double* loads) override {
     const SweepInput<double>& in = in_ = given;
-    executor_.for_each(n_groups(), [&](int g) {
-      cuts_[g].span = groups_[g].across([&](int k) { return gather(in.q, g, k); },
-                                        [&](int k) { return in.v ? gather(in.v, g, k) : Group{}; });
-    });
-    scan_velocities();
+    place_pieces();
     executor_.for_each(n_groups(), [&](int g) {
       groups_[g].calc_velocities(cuts_[g].ends.v_first);
       add_external(g);
@@ -114,6 +117,16 @@ class Chain final : public PiecewiseChain {
     PieceMotion<Group> motion;
   };
 
+  /// Poses and velocities of the pieces' ends, and the loops there.
+  void place_pieces() {
+    executor_.for_each(n_groups(), [&](int g) {
+      cuts_[g].span =
+          groups_[g].across([&](int k) { return gather(in_.q, g, k); },
+                            [&](int k) { return in_.v ? gather(in_.v, g, k) : Group{}; });
+    });
+    scan_velocities();
+  }
+
   int n_groups() const { return static_cast<int>(groups_.size()); }
   /// Or -1.
   int body_at(int g, int l, int k) const { return pieces_.body_at(g * native_lanes + l, k); }
@@ -153,7 +166,7 @@ class Chain final : public PiecewiseChain {
         if (closes) closed_[s].ends_chain = true;
         continue;
       }
-      const double u = in_.v ? in_.v[n] : 0, tau = in_.tau[n];
+      const double u = in_.v ? in_.v[n] : 0, tau = in_.tau ? in_.tau[n] : 0;
       const BodyConstants<double>& c = model_.constants[n];
       pose_[s] = RevoluteJoint::pose(c.tree, 0.0, in_.q[n]);
       Motion<double> v = pose_[s] * v_last;
@@ -322,6 +335,7 @@ Piecewise::Piecewise(const Model& model, const DynamicsOptions& options) {
     return;
   }
   require_thomas(options);
+  at_rest_.resize(model.nv());
   chain_ = std::make_unique<Chain<6>>(model, options);
 }
 
@@ -332,7 +346,24 @@ DynamicsReport Piecewise::evaluate(double, const SweepInput<double>& in, double*
   return chain_->evaluate(in, du, loads);
 }
 
-bool Piecewise::finds_loops() const { return chain_->finds_loops(); }
+bool Piecewise::finds_loops() const { return chain_->closure() != nullptr; }
+
+const LoopStates& Piecewise::find_loops(const SweepInput<double>& in) {
+  return chain_->find_loops(in);
+}
+
+const LoopReport& Piecewise::loop_report() const { return chain_->closure()->report(); }
+
+bool Piecewise::respond(const double* q, const double* asked, double null, double* du) {
+  SweepInput<double> in;
+  in.q = q;
+  in.tau = at_rest_.data();
+  in.gravity_factor = 0;
+  chain_->closure()->ask(asked, null);
+  const DynamicsReport report = chain_->evaluate(in, du, nullptr);
+  chain_->closure()->ask(nullptr, 0);
+  return report.ok() || report.outcome == Outcome::singular_position;
+}
 
 std::span<const double> Piecewise::constraint_force() const { return chain_->constraint_force(); }
 
@@ -356,7 +387,7 @@ bool Piecewise::closes_cheaply(const Model& model) {
   int rows = 0;
   for (const LoopJoint& loop : model.loops.joints) rows += loop_rows(model, loop);
   const int ends = static_cast<int>(PieceClosure::end_bodies(model).size());
-  return model.n_bodies() >= 4 * rows && model.n_bodies() >= 16 * ends;
+  return model.n_bodies() >= std::max({worth_cutting, 4 * rows, 16 * ends});
 }
 
 int Piecewise::pieces(int n_bodies) { return ChainPieces::wanted(n_bodies); }

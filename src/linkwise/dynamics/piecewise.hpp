@@ -22,6 +22,7 @@
 
 namespace linkwise {
 
+class LoopStates;
 class PiecewiseChain;
 
 class Piecewise : public DynamicsMethod {
@@ -35,16 +36,28 @@ class Piecewise : public DynamicsMethod {
   /// Of the cut joints.
   std::span<const double> constraint_force() const override;
 
+  // Where loops close.
+  /// As ArticulatedLoops::respond().
+  bool respond(const double* q, const double* asked, double null, double* du);
+  /// Loop joints at a state; torques may be null. They hold until the next evaluation.
+  const LoopStates& find_loops(const SweepInput<double>& in);
+  /// Of the last response or evaluation.
+  const LoopReport& loop_report() const;
+
   /// A chain of revolute joints without rotors, none prescribed, of at least min_bodies, all of
   /// regular inertia; without couplings or bearings, and with few loops.
   static bool suits(const Model& model);
-  /// Of what it takes: are there bodies enough for what its loops cost beside them?
+  /// With loops: does it take the model, and are there bodies enough for what these cost?
   static bool closes_cheaply(const Model& model);
+  /// On shorter chains the pieces are too short to pay for the cut system
+  /// (benchmarks/cpp/crossovers.cpp).
+  static constexpr int worth_cutting = 64;
   static constexpr int min_bodies = 16;
   static int pieces(int n_bodies);
 
  private:
   std::unique_ptr<PiecewiseChain> chain_;
+  std::vector<double> at_rest_;
 };
 
 }  // namespace linkwise

@@ -155,6 +155,35 @@ TEST(PiecewiseLoops, GivenMotionsOfTheAnchor) {
   expect_recursion(machine, 12, "given");
 }
 
+TEST(PiecewiseLoops, RespondsAtRestAsTheRecursionDoes) {
+  Draws draws(16);
+  LoopedMachine machine = chain(100, draws);
+  machine.close(JointType::spherical, -1, 99, draws);
+  machine.close(JointType::revolute, 10, 60, draws);
+  const Model& model = machine.model;
+  Piecewise pieces(model, {});
+  ArticulatedLoops recursion(model);
+  const std::vector<double> asked = random_values(6 * model.n_loops(), draws);
+  std::vector<double> got(model.nv()), want(model.nv());
+  ASSERT_TRUE(pieces.respond(machine.q.data(), asked.data(), 1e-12, got.data()));
+  ASSERT_TRUE(recursion.respond(machine.q.data(), asked.data(), 1e-12, want.data()));
+  expect_close(got, want, 1e-10, "rates");
+  // States are found without an evaluation, with and without rates.
+  LoopStates states(model);
+  SweepInput<double> in;
+  in.q = machine.q.data();
+  for (const bool moving : {true, false}) {
+    in.v = moving ? machine.v.data() : nullptr;
+    states.update(in);
+    const LoopStates& found = pieces.find_loops(in);
+    for (int l = 0; l < model.n_loops(); ++l)
+      for (int i = 0; i < states[l].held; ++i) {
+        EXPECT_NEAR(found[l].gap[i], states[l].gap[i], 1e-11);
+        EXPECT_NEAR(found[l].slip[i], states[l].slip[i], 1e-10);
+      }
+  }
+}
+
 TEST(PiecewiseLoops, AnyNumberOfThreadsGivesTheSameBits) {
   for (const int n : {100, 3000}) {
     Draws draws(13);
