@@ -308,7 +308,7 @@ def biped() -> Benchmark:
     builder.add_link("ground")
     builder.add_link("pelvis", mass=15.0, com=(0, 0, 0.1), inertia=np.diag([0.2, 0.15, 0.2]))
     builder.add_joint("pelvis", "floating", "ground", "pelvis", translation=(0, 0, 0.9))
-    rates = {}
+    rates: dict[str, float] = {}
     for side, name in ((1.0, "left"), (-1.0, "right")):
         inner = "pelvis"
         for joint, axes, below, mass, center, length in _LEG:
