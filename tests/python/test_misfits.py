@@ -163,6 +163,37 @@ def test_runs_have_it_as_a_cause_and_in_peaks_and_bounds() -> None:
     assert "misfit" not in bare.cause
 
 
+def test_it_is_no_need_of_the_motion() -> None:
+    """What each part of a motion needs is that of the machine whose bearings fit."""
+    builder = lw.ModelBuilder("door", gravity=(0, 0, -G))
+    builder.add_link("wall")
+    builder.add_link("door", mass=20, com=(0.4, 0, 1), inertia=np.diag([5, 6, 2.0]))
+    up = (0, 0, 1)
+    builder.add_joint("low", "revolute", "wall", "door", translation=(0, 0, 0.2), axis=up)
+    builder.add_loop(
+        "high",
+        "revolute",
+        "wall",
+        "door",
+        translation=(0, 0, 2),
+        child_translation=(0, 0, 1.8),
+        axis=up,
+    )
+    fits = builder.build().with_bearing("low", axial=1e6).with_bearing("high", axial=1e6)
+    model = fits.with_bearing("high", axial=1e6, offset=1e-4)
+    shares, expected = (
+        lw.loads.split(lw.simulate(m, duration=0.2, v0=[1.0], drives={"low": 0.5}), "motion")
+        for m in (model, fits)
+    )
+    assert set(shares.cause.values) == {*expected.cause.values, "misfit"}
+    for cause in expected.cause.values:
+        np.testing.assert_allclose(
+            shares.sel(cause=cause), expected.sel(cause=cause), rtol=1e-9, atol=1e-8
+        )
+    pressed = shares.sel(cause="misfit", component="fz", joint="high")
+    np.testing.assert_allclose(pressed, 1e-4 / (2 / 1e6), rtol=1e-9)
+
+
 def test_stored_runs_keep_what_bearings_decided(tmp_path) -> None:
     model = door().with_bearing("lower", axial=3e8, **UP).with_bearing("upper", axial=1e8, **UP)
     run = lw.simulate(model, duration=0.05, output=tmp_path / "run.zarr")

@@ -59,6 +59,7 @@ CAUSES: dict[str, dict[str, str]] = {
         "acceleration": "what the joints' accelerations need",
         "passive": "what balances damping, friction, springs and stops, in machines with loops",
         "external": "what balances the external wrenches",
+        "misfit": "what bearings do not fit by, and preloads, alone",
     },
 }
 

@@ -78,19 +78,23 @@ class DrivenMotion:
     def _parts(
         self, names: Sequence[str], q: Array, v: Array, a: Array, outside: Array | None
     ) -> list[Array]:
-        """What belongs to the rates is what is left of the whole: a_v alone may be rounding."""
+        """What belongs to the rates is what is left of the whole: a_v alone may be rounding. Misfits
+        of bearings load a machine that needs nothing."""
         N = _core.driven_jacobian(self.model, q, self.driven)
         speeding = np.einsum("tij,tj->ti", N, self._driven_accelerations(q, v, a))
         whole = self._loads(q, v, a, gravity=1.0)
+        misfit = self._loads(q, None, None) if "misfit" in names else 0.0
         made = {
-            "gravity": self._loads(q, None, None, gravity=1.0),
-            "acceleration": self._loads(q, None, speeding),
+            "gravity": self._loads(q, None, None, gravity=1.0) - misfit,
+            "acceleration": self._loads(q, None, speeding) - misfit,
         }
-        made["velocity"] = whole - made["gravity"] - made["acceleration"]
+        made["velocity"] = whole - made["gravity"] - made["acceleration"] - misfit
         if "passive" in names:
             made["passive"] = self._loads(q, v, a, gravity=1.0, passive=True) - whole
         if "external" in names:
-            made["external"] = self._loads(q, None, None, outside=outside)
+            made["external"] = self._loads(q, None, None, outside=outside) - misfit
+        if "misfit" in names:
+            made["misfit"] = np.asarray(misfit)
         return [made[name] for name in names]
 
     def _driven_accelerations(self, q: Array, v: Array, a: Array) -> Array:
