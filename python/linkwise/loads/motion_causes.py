@@ -78,8 +78,8 @@ class DrivenMotion:
     def _parts(
         self, names: Sequence[str], q: Array, v: Array, a: Array, outside: Array | None
     ) -> list[Array]:
-        """What belongs to the rates is what is left of the whole: a_v alone may be rounding. Misfits
-        of bearings load a machine that needs nothing."""
+        """What belongs to the rates is what is left of the whole: a_v alone may be rounding.
+        Misfits of bearings load a machine that needs nothing."""
         N = _core.driven_jacobian(self.model, q, self.driven)
         speeding = np.einsum("tij,tj->ti", N, self._driven_accelerations(q, v, a))
         whole = self._loads(q, v, a, gravity=1.0)
