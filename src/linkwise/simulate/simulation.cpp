@@ -14,10 +14,6 @@
 namespace linkwise {
 namespace {
 
-// Above this an acceleration counts as infinite. Below it no sum within a step can overflow, so a
-// member that fails cannot end the others.
-constexpr double largest_acceleration = 1e100;
-
 constexpr double whole_turn = 2 * std::numbers::pi;
 
 }  // namespace
@@ -74,20 +70,14 @@ void Simulation::start(double t0, const Start& start) {
   }
   integrator_ = make_integrator(setup_->options.integrator, *system, setup_->options.integration);
   start_.assign(y_.begin(), y_.begin() + position_size());
-  extremes_.clear();
-  for (size_t i = 0; i < members_ && !directions_.empty(); ++i) {
-    extremes_.emplace_back(*setup_, start.tau ? start.tau + i * nv() : nullptr, directions_);
-    if (loops_) evaluate_for(extremes_[i]);
-    extremes_[i].begin(t0, y_.data() + i * nq(), rates_in(y_.data()) + i * nv());
-  }
-  extremes_until_ = advanced_to_ = t0;
+  keep_extremes_from(t0, start.tau);
   if (state_) return integrator_->start(t0, state_->from_rates(y_));
   std::vector<double> y = y_;
   for (size_t i = 0; i < members_; ++i)
     parent_axes_.from_child(y.data() + i * nq(), rates_in(y.data()) + i * nv());
   integrator_->start(t0, y);
   integrator_->interpolate(t0, y);
-  watch_start(t0, y.data());
+  watch_->start(t0, y.data());
 }
 
 /// Tells what closing loops did to the rates that were asked for. Refuses a start at rest where
@@ -112,152 +102,21 @@ void Simulation::check_start(double t0, const double* asked) {
                      "change lengths or places of joints, or let a stiff spring stand for a rod");
 }
 
-void Simulation::make_methods(double t0) {
-  method_.reset();
-  output_method_.reset();
-  aside_method_.reset();
-  work_method_.reset();
-  solver_tolerance_.reset();
-  lanes_.reset();
-  if (members_ > 1) {
-    lanes_ = std::make_unique<BatchEvaluator>(setup_->driven());
-    return;
-  }
-  const SimulationOptions& options = setup_->options;
-  DynamicsOptions integrated = options.dynamics;
-  if (follows_error_test()) {
-    const IntegratorOptions& o = options.integration;
-    solver_tolerance_ = std::make_unique<SolverTolerance>(
-        setup_->driven(), o.relative_tolerance > 0 ? o.relative_tolerance : o.tolerance,
-        o.absolute_tolerance > 0 ? o.absolute_tolerance : o.tolerance,
-        options.dynamics.solver_options.tolerance);
-    integrated.solver_options.energy_bound = solver_tolerance_->bound();
-    solver_tolerance_->start(t0);
-  }
-  method_ = make_dynamics(setup_->driven(), integrated);
-  output_method_ = make_dynamics(setup_->driven(), options.dynamics);
+void Simulation::watch_forces() {
+  watch_.emplace(*setup_, *forces_, members_,
+                 ForceWatch::Host{
+                     [this](double t, double* y) {
+                       to_state(y);
+                       impose(t, y);
+                     },
+                     [this](const double* y, double* scale) { error_scale(y, scale); },
+                     [this](double t, double* y, double* ydot) { evaluate_accepted(t, y, ydot); }});
 }
 
-bool Simulation::follows_error_test() const {
-  const SimulationOptions& options = setup_->options;
-  const std::string& solver = setup_->choice.solver;
-  if (!options.follow_error_test || options.state) return false;
-  if (solver.empty() || find_solver(solver).kind == SolverKind::direct) return false;
-  if (options.dynamics.solver_options.stop != StopRule::energy_norm) return false;
-  // With the guess zero, solutions must depend on time and state alone.
-  if (options.dynamics.initial_guess == "zero") return false;
-  return !find_integrator(options.integrator).fixed_step;
-}
-
-// ---- Accelerations ------------------------------------------------------------------------------
-
-SweepInput<double> Simulation::input(double t, const double* q, const double* v) {
-  forces_->evaluate(t, q, v);
-  SweepInput<double> in;
-  in.q = q;
-  in.v = v;
-  in.tau = forces_->tau(0);
-  in.prescribed = given_.data();
-  in.external = forces_->external(0);
-  if (const LoopForces* loops = forces_->loops()) {
-    in.loop_tau = loops->tau();
-    loops->give_to(in);
-  }
-  return in;
-}
-
-/// From `member` on.
-BatchInput Simulation::rows(const double* y, size_t member) const {
-  BatchInput in;
-  in.q = y + member * nq();
-  in.v = rates_in(y) + member * nv();
-  in.tau = forces_->tau(member);
-  in.prescribed = setup_->any_given() ? given_.data() + member * nv() : nullptr;
-  in.external = forces_->external(member);
-  return in;
-}
-
-/// method: of one member.
-Outcome Simulation::accelerations(DynamicsMethod* method, double t, const double* y, double* du,
-                                  double* loads) {
-  if (lanes_) return on_lanes(t, y, du, loads);
-  const SweepInput<double> in = input(t, y, rates_in(y));
-  const auto evaluation = [&] { return method->evaluate(t, in, du, loads); };
-  const bool is_integration = method == method_.get();
-  return judge(t, is_integration ? observed(t, evaluation) : evaluation(), du,
-               static_cast<int>(nv()));
-}
-
-/// Of all members; those whose evaluation fails end.
-Outcome Simulation::on_lanes(double t, const double* y, double* du, double* loads) {
-  forces_->evaluate(t, y, rates_in(y));
-  const bool sound = lanes_->forward_dynamics(members_, rows(y, 0), du, loads) < 0;
-  for (size_t i = 0; i < members_; ++i) {
-    if (!endings_[i].ok()) continue;
-    double* row = du + i * nv();
-    const int body = sound ? -1
-                           : lanes_->forward_dynamics(1, rows(y, i), row,
-                                                      loads ? loads + i * load_width() : nullptr);
-    bool finite = true;
-    for (size_t k = 0; k < nv(); ++k) finite &= std::abs(row[k]) < largest_acceleration;
-    if (body >= 0)
-      endings_[i] = failure(i, t, Outcome::not_positive_definite, body, row);
-    else if (!finite)
-      endings_[i] = failure(i, t, Outcome::not_finite, -1, row);
-  }
-  return any_running() ? Outcome::converged : endings_[0].outcome;
-}
-
-DynamicsReport Simulation::observed(double t, const std::function<DynamicsReport()>& evaluation) {
-  return observer_ ? observer_->evaluate(t, evaluation) : evaluation();
-}
-
-/// Of one member: an integrator that chooses its steps may recover, so nothing ends yet.
-Outcome Simulation::judge(double t, const DynamicsReport& report, const double* du, int n) {
-  iterations_ += report.iterations;
-  loop_report_ = report.loops;
-  double sum = 0;
-  for (int i = 0; i < n; ++i) sum += du[i];
-  // If rounding keeps the forces from the accuracy that the error test asks for, the fixed
-  // tolerance is good enough.
-  const bool good_enough =
-      solver_tolerance_ && report.outcome == Outcome::stagnated &&
-      report.error_estimate <= setup_->options.dynamics.solver_options.tolerance;
-  if ((report.ok() || good_enough) && std::isfinite(sum)) {
-    if (report.iterations > 0)
-      solver_error_ =
-          std::max(solver_error_, report.error_is_bound ? report.error_estimate
-                                                        : std::numeric_limits<double>::infinity());
-    return Outcome::converged;
-  }
-  failure_ = failure(0, t, report.ok() ? Outcome::not_finite : report.outcome, report.body, du);
-  return failure_.outcome;
-}
-
-Ending Simulation::failure(size_t member, double t, Outcome outcome, int body,
-                           const double* du) const {
-  const Model& m = model();
-  // Looks at the torques first and then at the accelerations, because one bad torque spoils all
-  // accelerations.
-  int joint = body < 0 ? forces_->joint_with_bad_force(member) : -1;
-  for (int j = 0; j < m.n_joints() && joint < 0; ++j) {
-    const JointInfo& info = m.joints[j];
-    if (body >= 0 && info.body == body && info.last_of_body) joint = j;
-    for (int i = info.v; i < info.v + info.nv && body < 0; ++i)
-      if (!(std::abs(du[i]) < largest_acceleration)) joint = j;
-  }
-  return {outcome, t, joint < 0 ? "" : m.joint_at(joint).name, described(outcome, body)};
-}
-
-/// A fixed step that is too long for a stiff machine ends in states that cannot be evaluated.
-std::string Simulation::described(Outcome outcome, int body) const {
-  if (outcome == Outcome::singular_position && loops_) return of_singular_position();
-  const bool of_state = outcome == Outcome::not_finite || outcome == Outcome::not_positive_definite;
-  if (!of_state || !find_integrator(setup_->options.integrator).fixed_step)
-    return std::string(message(outcome)) + "; " + remedy_at(model(), outcome, body);
-  return std::string(message(outcome)) +
-         "; take a smaller step, or an integrator that chooses its steps. If that does not help, " +
-         remedy_at(model(), outcome, body);
+/// At the state accepted last.
+void Simulation::evaluate_accepted(double t, double* y, double* ydot) {
+  integrator_->interpolate(t, {y, static_cast<size_t>(size())});
+  if (evaluate_aside(t, y, ydot) != Outcome::converged) std::fill_n(ydot, size(), 0.0);
 }
 
 // ---- What the integrator sees -------------------------------------------------------------------
@@ -265,7 +124,7 @@ std::string Simulation::described(Outcome outcome, int body) const {
 Outcome Simulation::evaluate(double t, const double* y, double* ydot) {
   if (solver_tolerance_) solver_tolerance_->set(t);
   const Outcome outcome = evaluate_by(method_.get(), t, y, ydot);
-  if (outcome == Outcome::converged) watch_evaluation(t, y, ydot);
+  if (outcome == Outcome::converged) watch_->evaluated(t, y, ydot, endings_);
   return outcome;
 }
 
@@ -329,7 +188,7 @@ void Simulation::accepted(double t, const double* y) {
   if (method_) method_->accepted(t);
   if (loops_) coast_on(t, y);
   if (forces_->loops()) count_turns(t, y);
-  watch_step(t, y);
+  watch_->accepted(t, y, breaks_at(t), endings_);
 }
 
 /// The same motion is held as well many turns later or far from the origin: angles are weighed by
@@ -454,37 +313,29 @@ void Simulation::add_work_of_step() {
                   [this](double t, double* out) { return powers(t, out); });
 }
 
-/// The last step counts once it is reached as a whole.
+void Simulation::keep_extremes_from(double t0, const double* tau) {
+  extremes_.reset();
+  advanced_to_ = t0;
+  if (directions_.empty()) return;
+  extremes_.emplace(
+      *setup_, members_, tau, directions_, [this](double t) -> const auto& {
+        interpolate(t);
+        return y_;
+      });
+  for (Extremes& of_member : extremes_->of_members())
+    if (loops_) evaluate_for(of_member);
+  extremes_->begin(t0, y_);
+}
+
 void Simulation::add_step_to_extremes() {
+  if (!extremes_) return;
   const double t = integrator_->time();
-  if (extremes_.empty() || !(t > extremes_until_)) return;
-  interpolate_step(t);
-  for (size_t i = 0; i < members_; ++i)
-    if (endings_[i].ok()) add_step(i, t, breaks_at(t), extremes_[i]);
-  extremes_until_ = t;
-}
-
-/// From where extremes were kept until t.
-void Simulation::interpolate_step(double t) {
-  interpolate(extremes_until_ + (t - extremes_until_) / 2);
-  middle_ = y_;
-  interpolate(t);
-}
-
-void Simulation::add_step(size_t member, double t, bool breaks, Extremes& to) const {
-  to.add_step(middle_.data() + member * nq(), rates_in(middle_.data()) + member * nv(), t,
-              y_.data() + member * nq(), rates_in(y_.data()) + member * nv(), breaks);
+  extremes_->add_step(t, breaks_at(t), endings_);
 }
 
 std::vector<double> Simulation::extremes(size_t member) {
-  extremes_[member].trim();
-  Extremes whole = extremes_[member];
-  if (advanced_to_ > extremes_until_ && endings_[member].ok()) {
-    interpolate_step(advanced_to_);
-    add_step(member, advanced_to_, false, whole);
-  }
-  if (loops_ && !std::isnan(coasting_.passed())) whole.leave_loads_open();
-  return std::move(whole).found();
+  return extremes_->found(member, advanced_to_, endings_[member].ok(),
+                          loops_ && !std::isnan(coasting_.passed()));
 }
 
 /// What holds joints of given motion follows from the accelerations of the others. False where

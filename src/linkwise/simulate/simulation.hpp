@@ -2,6 +2,7 @@
 // The time loop: drives, dynamics and integrator, sampled at the times asked for. Free of Python
 // apart from user callables. One simulation has one member, or several that differ in their initial
 // states and share SIMD lanes and fixed steps.
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -11,9 +12,8 @@
 #include "linkwise/dynamics/loop_projection.hpp"
 #include "linkwise/simulate/applied_forces.hpp"
 #include "linkwise/simulate/coasting.hpp"
-#include "linkwise/simulate/extremes.hpp"
-#include "linkwise/simulate/fixed_step_forces.hpp"
-#include "linkwise/simulate/force_accuracy.hpp"
+#include "linkwise/simulate/force_watch.hpp"
+#include "linkwise/simulate/kept_extremes.hpp"
 #include "linkwise/simulate/parent_axes.hpp"
 #include "linkwise/simulate/quantity.hpp"
 #include "linkwise/simulate/setup.hpp"
@@ -68,7 +68,7 @@ class Simulation : private OdeSystem {
   /// From the next start on, keeps the extremes between samples; directions: those of Extremes.
   void keep_extremes(std::vector<double> directions) { directions_ = std::move(directions); }
   const std::vector<double>& directions() const { return directions_; }
-  bool keeps_extremes() const { return !extremes_.empty(); }
+  bool keeps_extremes() const { return extremes_.has_value(); }
   /// Of one member until the last time that was advanced to, Extremes::size() numbers.
   std::vector<double> extremes(size_t member = 0);
 
@@ -77,9 +77,9 @@ class Simulation : private OdeSystem {
   /// As Integrator::stiffness().
   std::string stiffness() const { return integrator_ ? integrator_->stiffness() : std::string(); }
   /// One line where forces of large gain are not known well, with the remedy; else empty.
-  std::string force_doubt(size_t member = 0) const;
+  std::string force_doubt(size_t member = 0) const { return watch_->doubt(member); }
   /// With fixed steps: how much of the largest force that is; 0 where they are known well.
-  double force_error(size_t member) const;
+  double force_error(size_t member) const { return watch_->error(member); }
   /// Where loads of closed loops have no bound, one line; empty: nowhere.
   std::string loop_doubt() const;
   /// Whether works were found, where they were asked for.
@@ -121,21 +121,22 @@ class Simulation : private OdeSystem {
   Outcome project(double t, double* y) override;
   void accepted(double t, const double* y) override;
   void error_scale(const double* y, double* scale) const override;
-  void limit_errors(const double* y, double* allowed) const override;
-  double step_limit(double t) override;
-  bool has_jumped() const override { return accuracy_ && accuracy_->has_jumped(); }
+  void limit_errors(const double* y, double* allowed) const override {
+    watch_->limit_errors(y, allowed);
+  }
+  double step_limit(double t) override {
+    return std::min(step_limits_->after(t), watch_->step_limit(t));
+  }
+  bool has_jumped() const override { return watch_->has_jumped(); }
   bool retakes(double begin, double end, const double* y,
-               const std::function<void(double, double*)>& state) override;
+               const std::function<void(double, double*)>& state) override {
+    return watch_->retakes(begin, end, y, state);
+  }
   bool breaks_at(double t) override { return step_limits_->breaks_at(t); }
 
   void make_methods(double t0);
   void watch_forces();
-  void keep_acting(const double* ydot);
-  void weigh_forces(double t, const double* y);
-  void watch_start(double t, const double* y);
-  std::pair<const double*, const double*> watched(double t, const double* y, size_t member);
-  void watch_evaluation(double t, const double* y, const double* ydot);
-  void watch_step(double t, const double* y);
+  void evaluate_accepted(double t, double* y, double* ydot);
   void close_loops(double t0, const std::vector<std::string>& hold);
   void check_start(double t0, const double* asked);
   void begin_coasting();
@@ -178,9 +179,8 @@ class Simulation : private OdeSystem {
   bool end_all(const Ending& ending);
   void interpolate(double t);
   void add_work_of_step();
+  void keep_extremes_from(double t0, const double* tau);
   void add_step_to_extremes();
-  void interpolate_step(double t);
-  void add_step(size_t member, double t, bool breaks, Extremes& to) const;
   bool powers(double t, double* out);
   bool write_sample(double t, const Sample& sample);
   void check_sample(double t, size_t member, const Sample& sample);
@@ -194,9 +194,7 @@ class Simulation : private OdeSystem {
   size_t members_ = 1;
   std::optional<AppliedForces> forces_;
   std::optional<StepLimits> step_limits_;
-  std::unique_ptr<LoopWatch> loop_watch_;      ///< null: nothing that closes loops has a gain
-  std::optional<ForceAccuracy> accuracy_;      ///< of one member, with an error test
-  std::vector<FixedStepForces> fixed_forces_;  ///< of each member; none: steps are chosen
+  std::optional<ForceWatch> watch_;
   /// Of one member; loads at output times are computed apart, to the fixed tolerance.
   std::unique_ptr<DynamicsMethod> method_, output_method_;
   std::unique_ptr<DynamicsMethod> aside_method_, work_method_;  ///< made when first needed
@@ -215,13 +213,11 @@ class Simulation : private OdeSystem {
   std::unique_ptr<IntegratedState> state_;
   std::optional<WorkIntegral> work_;
   bool work_is_done_ = false;
-  std::vector<double> directions_, middle_;
-  std::vector<Extremes> extremes_;  ///< of each member; none: not kept
-  double extremes_until_ = 0, advanced_to_ = 0;
+  std::vector<double> directions_;
+  std::optional<KeptExtremes> extremes_;  ///< none: not kept
+  double advanced_to_ = 0;
   bool sampled_ = false;  ///< since the start
   /// Rows per member: state, that of an evaluation, given accelerations, samples.
-  std::vector<double> acting_;  ///< of the last evaluation: derivatives of y, torques
-  std::vector<double> scale_;
   std::vector<double> y_, evaluated_, given_, du_, loads_, total_;
   std::vector<double> start_;  ///< positions there
   std::vector<Ending> endings_;
