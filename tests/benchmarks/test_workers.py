@@ -136,14 +136,14 @@ def program(text):
         ("import os; os.abort()", "killed by SIGABRT"),
         ("import sys; sys.exit('the library is broken')", "the library is broken"),
         ("input(); raise SystemExit(3)", "ended with status 3"),
-        ("import time; time.sleep(600)", "takes more than 0.5 s"),
+        ("import threading; threading.Event().wait()", "takes more than 0.5 s"),
         ('input(); print(\'{"error": "no such joint"}\')', "no such joint"),
         ('input(); print(\'{"error": "out of memory"}\')', "needs more than 1.0 GiB of memory"),
     ],
 )
 def test_why_a_worker_failed(text, reason):
     with program(text) as worker, pytest.raises(WorkerError) as failed:
-        worker.ask("build", timeout=0.5 if "sleep" in text else FUSE)
+        worker.ask("build", timeout=0.5 if "wait" in text else FUSE)
     assert str(failed.value) == reason
 
 

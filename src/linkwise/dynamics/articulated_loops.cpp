@@ -5,17 +5,11 @@
 #include <cstdint>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/kinematics/coupling_states.hpp"
 
 namespace linkwise {
 namespace {
 
-/// Of directions that are nearly dependent: some thousandths from a singular position. Closer to it
-/// noise takes over, measured on rows of four-bars; further from it coasting is less accurate.
-constexpr double weak_pivot = 1e-5;
-/// Pivots of the scaled Lambda below this are zero: rounding errors leave 1e-16 of a zero.
-constexpr double null_pivot = 1e-10;
 /// Independent rows answer alone where their pivots are so many times what is weak or zero, and
 /// where the others hold to this part of the accelerations.
 constexpr double clearly = 10, kept = 1e-11;
@@ -31,24 +25,6 @@ std::vector<KindRange> part_of(const std::vector<KindRange>& all, int begin, int
     if (range.begin < range.end) part.push_back(range);
   }
   return part;
-}
-
-/// What a body yields to a wrench, all else left free. Where its inertia is singular it is given
-/// some: D only weighs forces that constraints leave open.
-Compliance<double> yielding(const Model& model, int body, const Transform<double>& X) {
-  if (body < 0) return {};
-  Inertia<double> M = with_body(
-      model, body, [](const auto& own) -> Inertia<double> { return frozen_inertia(own); });
-  ArticulatedInertia<double> Y;
-  add_inertia(Y, M);
-  double L[21];
-  if (!linkwise::factor(Y, L, 1e-10)) {
-    const double lever = dot(X.r, X.r), own = M.I.m[0] + M.I.m[2] + M.I.m[5];
-    if (!(M.m > 0)) M.m = model.total_mass();
-    const double more = 0.1 * own + M.m * (lever > 0 ? lever : own > 0 ? 0 : 1);
-    for (const int i : {0, 2, 5}) M.I.m[i] += more;
-  }
-  return invert_inertia(M);
 }
 
 /// Of each term the column of its joint's P, or -1 where its motion is given. InputError where all
@@ -80,8 +56,6 @@ std::vector<int> terms_of(const Model& model, const Coupling& coupling) {
   return columns;
 }
 
-Force<double> direction(const Vector6<double>& Q) { return to_force(Q.data()); }
-
 }  // namespace
 
 ArticulatedLoops::ArticulatedLoops(const Model& model)
@@ -89,7 +63,8 @@ ArticulatedLoops::ArticulatedLoops(const Model& model)
       sweeps_(model),
       states_(model),
       groups_(make_loop_groups(model)),
-      has_bias_(has_armature_bias(model.loops)) {
+      metric_(model),
+      torques_(model) {
   for (const Coupling& coupling : model.couplings) terms_.push_back(terms_of(model, coupling));
   work_.resize(groups_.size());
   for (size_t g = 0; g < groups_.size(); ++g) {
@@ -111,10 +86,6 @@ ArticulatedLoops::ArticulatedLoops(const Model& model)
   }
   const int n_groups = static_cast<int>(groups_.size());
   if (end > 0) stages_.push_back({part_of(model.kind_ranges, 0, end), n_groups, n_groups});
-  for (const LoopJoint& loop : model.loops.joints) {
-    compliance_a_.push_back(yielding(model, loop.parent_body, loop.on_parent));
-    compliance_b_.push_back(yielding(model, loop.joint.body, loop.on_child));
-  }
   if (!model.bearings.empty()) make_bearing_shares();
 }
 
@@ -140,7 +111,7 @@ bool ArticulatedLoops::evaluate(const SweepInput<double>& given, double* du, dou
   // A gap makes dependent constraints independent, by pivots of the order of its square: they are
   // zero as well. And it makes what they demand differ.
   const double gap = widest_miss(states_, false), slip = widest_miss(states_, true);
-  if (!asked_) null_ = std::clamp(100 * gap * gap, null_pivot, 1e-4);
+  if (!asked_) null_ = null_pivot(gap);
   report_ = {};
   report_.open = std::max(gap, slip);
   add_known_wrenches(in);
@@ -250,8 +221,7 @@ void ArticulatedLoops::find_independent() {
     best = report_.smallest_pivot;
     for (size_t g = 0; g < groups_.size(); ++g) take_rows(static_cast<int>(g), taken[g]);
   }
-  auto loops =
-      std::make_unique<IndependentLoops>(model_, groups_, taken, compliance_a_, compliance_b_);
+  auto loops = std::make_unique<IndependentLoops>(model_, groups_, taken, metric_);
   in.q = start.data();
   if (!evaluate(in, du.data(), nullptr)) return;
   if (report_.open < 1e-6) {
@@ -393,17 +363,7 @@ void ArticulatedLoops::factor(const SweepInput<double>& in, int g, bool with_loa
       D[0] = yielding_of(in, member);
       continue;
     }
-    const LoopState& loop = states_[member.loop];
-    Force<double> on_a[6], on_b[6];
-    for (int i = 0; i < member.n_rows; ++i) {
-      const Force<double> Q = direction(loop.row[i]);
-      on_a[i] = wrench_on_a(loop, Q);
-      on_b[i] = wrench_on_b(model_.loops.joints[member.loop], Q);
-      const Motion<double> a = compliance_a_[member.loop] * on_a[i],
-                           b = compliance_b_[member.loop] * on_b[i];
-      for (int j = 0; j <= i; ++j) D[packed(i, j)] = dot(a, on_a[j]) + dot(b, on_b[j]);
-      D[packed(i, i)] += loop.yields[i];
-    }
+    metric_.calc(member.loop, states_[member.loop], D);
   }
   system.factor(null_, with_loads);
   report_.rows += group.rows - group.rotors;
@@ -458,24 +418,12 @@ void ArticulatedLoops::solve_forces(const SweepInput<double>& in, int g, bool wi
   }
 }
 
-/// What is given, less what rotors of turning rates take by themselves.
 void ArticulatedLoops::add_known_wrenches(const SweepInput<double>& in) {
-  known_tau_ = in.loop_tau;
-  if (has_bias_ && in.v) {
-    tau_.assign(model_.loops.nv, 0.0);
-    if (in.loop_tau) std::copy_n(in.loop_tau, tau_.size(), tau_.begin());
-    add_armature_bias(model_.loops, states_.v().data(), -1, tau_.data());
-    known_tau_ = tau_.data();
-  }
-  if (!known_tau_) return;
+  torques_.update(in, states_);
+  if (!torques_.any()) return;
   for (int l = 0; l < model_.n_loops(); ++l) {
     const LoopState& loop = states_[l];
-    Force<double> w;
-    for (int k = 0; k < loop.basis.n; ++k) {
-      const Force<double> dual = direction(loop.basis.dual[k]);
-      const double tau = known_tau_[loop.dof[k]];
-      w += tau * dual;
-    }
+    const Force<double> w = torques_.wrench(loop);
     const LoopJoint& at = model_.loops.joints[l];
     if (at.parent_body >= 0) sweeps_.add_wrench(at.parent_body, wrench_on_a(loop, w));
     if (at.joint.body >= 0) sweeps_.add_wrench(at.joint.body, wrench_on_b(at, w));
@@ -496,10 +444,7 @@ double ArticulatedLoops::yielding_of(const SweepInput<double>& in,
     double yields = 0;
     if (term.closes) {
       const int l = term.joint - model_.n_joints();
-      const Force<double> along = direction(states_[l].basis.dual[0]);
-      const Force<double> on_a = wrench_on_a(states_[l], along),
-                          on_b = wrench_on_b(model_.loops.joints[l], along);
-      yields = dot(compliance_a_[l] * on_a, on_a) + dot(compliance_b_[l] * on_b, on_b);
+      yields = metric_.yields(l, states_[l], direction(states_[l].basis.dual[0]));
     } else {
       yields = sweeps_.yielding(term.body, k);
     }
@@ -550,25 +495,14 @@ void ArticulatedLoops::coupling_loads(const double* q, std::vector<double>& load
     }
 }
 
-void ArticulatedLoops::store_loop_load(int l, const Force<double>& w, double* loads) const {
-  const Vector6<double> user =
-      to_array(inverse_transpose_times(model_.loops.joints[l].joint.to_user, w));
-  std::copy(user.begin(), user.end(), loads + 6 * l);
-}
-
 void ArticulatedLoops::store_loop_loads(double* loads) {
   std::vector<Force<double>>& load = load_;
   load.assign(model_.n_loops(), {});
   for (int g = 0; g < static_cast<int>(groups_.size()); ++g)
     add_to_load(g, work_[g].f.data(), load);
   for (int l = 0; l < model_.n_loops(); ++l) {
-    const LoopState& loop = states_[l];
-    for (int k = 0; known_tau_ && k < loop.basis.n; ++k) {
-      const Force<double> dual = direction(loop.basis.dual[k]);
-      const double tau = known_tau_[loop.dof[k]];
-      load[l] += tau * dual;
-    }
-    store_loop_load(l, load[l], loads);
+    load[l] += torques_.wrench(states_[l]);
+    store_loop_load(model_.loops.joints[l], load[l], loads + 6 * l);
   }
 }
 

@@ -17,6 +17,7 @@
 #include "linkwise/dynamics/loop_groups.hpp"
 #include "linkwise/dynamics/loop_report.hpp"
 #include "linkwise/dynamics/loop_system.hpp"
+#include "linkwise/dynamics/loop_wrenches.hpp"
 #include "linkwise/recursion/tree_sweeps.hpp"
 
 namespace linkwise {
@@ -89,7 +90,6 @@ class ArticulatedLoops {
   void store_loop_loads(double* loads);
   void add_coupling_to_load(const LoopGroup::Member& member, double f,
                             std::vector<Force<double>>& load) const;
-  void store_loop_load(int l, const Force<double>& w, double* loads) const;
   void make_bearing_shares();
   void store_stress(int g, const double* f, const double* q, double* loads) const;
   double size_of(const LoopGroup::Member& member, const double* f, const double* q) const;
@@ -101,6 +101,8 @@ class ArticulatedLoops {
   TreeSweeps<double> sweeps_;
   LoopStates states_;
   std::vector<LoopGroup> groups_;
+  LoopMetric metric_;
+  LoopTorques torques_;  ///< of the last evaluation
   std::vector<Work> work_;
   std::vector<LoopSystem> systems_;
   /// Ranges of bodies that are swept between the eliminations of groups, and how many groups are
@@ -110,7 +112,6 @@ class ArticulatedLoops {
     int first_group, last_group;
   };
   std::vector<Stage> stages_;
-  std::vector<Compliance<double>> compliance_a_, compliance_b_;  ///< by loop
   std::vector<std::vector<int>> terms_;  ///< by coupling: columns of its joints, -1: given motion
   std::unique_ptr<IndependentLoops> independent_;  ///< made when accelerations are asked for
   bool independent_known_ = false, took_independent_ = false;
@@ -121,9 +122,6 @@ class ArticulatedLoops {
   const double* asked_ = nullptr;  ///< in place of what rates ask for
   double null_ = 0;                ///< pivots of the scaled Lambda below this are zero
   std::vector<double> at_rest_;
-  bool has_bias_;  ///< of rotors on loop joints
-  std::vector<double> tau_;
-  const double* known_tau_ = nullptr;  ///< [nv] of loop joints, in the last evaluation
 };
 
 }  // namespace linkwise

@@ -2,20 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+
+#include "linkwise/simd/lane_memory.hpp"
 
 namespace linkwise {
 namespace {
 
 constexpr int width = UpperRows::width;
 using Wide = UpperRows::Wide;
-
-LW_INLINE Wide load(const double* from) {
-  Wide x;
-  std::memcpy(&x, from, sizeof x);
-  return x;
-}
-LW_INLINE void store(double* to, const Wide& x) { std::memcpy(to, &x, sizeof x); }
 
 int blocks(int columns) { return (columns + width - 1) / width; }
 
@@ -55,9 +49,8 @@ double sum_of_sizes(const Vec3<double>& r) { return std::abs(r.x) + std::abs(r.y
 
 IndependentLoops::IndependentLoops(const Model& model, const std::vector<LoopGroup>& groups,
                                    const std::vector<std::vector<char>>& taken,
-                                   const std::vector<Compliance<double>>& of_parents,
-                                   const std::vector<Compliance<double>>& of_children)
-    : model_(model), of_parents_(of_parents), of_children_(of_children), dropped_(model.n_loops()) {
+                                   const LoopMetric& metric)
+    : model_(model), metric_(metric), dropped_(model.n_loops()) {
   for (size_t g = 0; g < groups.size(); ++g) {
     groups_.push_back(reduced(groups[g], taken[g]));
     work_.push_back(work_of(groups_.back()));
@@ -152,7 +145,7 @@ void IndependentLoops::set_directions(const LoopState& loop, int l, const Member
     add_lane(block.Q, i, to_force(q.data()));
   }
   block.on_b = transpose_times(model_.loops.joints[l].on_child, block.Q);
-  block.yields = dot(of_children_[l] * block.on_b, block.on_b);
+  block.yields = dot(metric_.of_child(l) * block.on_b, block.on_b);
 }
 
 /// Unit forces where they act, what they ask for, and what the bodies yield to them.
@@ -169,7 +162,7 @@ void IndependentLoops::place(const LoopStates& states, Member& member, Work& w) 
     };
     add(at(0), block.count, on_a, w);
     add(at(1), block.count, block.on_b, w);
-    const Wide yields = block.yields + dot(of_parents_[l] * on_a, on_a);
+    const Wide yields = block.yields + dot(metric_.of_parent(l) * on_a, on_a);
     for (int i = 0; i < block.count; ++i) {
       const int k = member.kept[block.begin + i], row = member.row + block.begin + i;
       w.r[row] = loop.r[k];
@@ -213,7 +206,7 @@ void IndependentLoops::add_products(const Carrier& carrier, int dof, Work& w) co
       for (int k = 1; k < dof; ++k) sum += columns[i / width].z[k][i % width] * columns[b].y[k];
       if (carrier.in_a_row) {
         double* const to = row + base + b * width;
-        store(to, load(to) + sum);
+        store_lanes(to, load_lanes<Wide>(to) + sum);
       } else {
         for (int j = 0; j < width && b * width + j < carrier.count; ++j)
           row[carrier.rows[b * width + j]] += sum[j];

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "linkwise/dynamics/loop_groups.hpp"
+#include "linkwise/dynamics/loop_wrenches.hpp"
 #include "linkwise/linear/upper_rows.hpp"
 #include "linkwise/recursion/tree_sweeps.hpp"
 
@@ -22,9 +23,7 @@ class IndependentLoops {
   using Wide = UpperRows::Wide;
   /// taken: of each group its rows. No group may have couplings. All must outlive this.
   IndependentLoops(const Model& model, const std::vector<LoopGroup>& groups,
-                   const std::vector<std::vector<char>>& taken,
-                   const std::vector<Compliance<double>>& of_parents,
-                   const std::vector<Compliance<double>>& of_children);
+                   const std::vector<std::vector<char>>& taken, const LoopMetric& metric);
 
   int rows(int g) const { return groups_[g].rows; }
 
@@ -93,7 +92,7 @@ class IndependentLoops {
   void pass_on(const Carrier& carrier, Work& w) const;
 
   const Model& model_;
-  const std::vector<Compliance<double>>&of_parents_, &of_children_;
+  const LoopMetric& metric_;
   std::vector<Group> groups_;
   std::vector<Work> work_;
   std::vector<std::vector<int>> dropped_;  ///< by loop

@@ -36,7 +36,7 @@ void ArticulatedLoops::store_stress(int g, const double* f, const double* q, dou
       model_, q, [&](int n) { return of_body[n]; }, loads);
   add_to_load(g, f, of_loop);
   for (int l = 0; l < model_.n_loops(); ++l)
-    store_loop_load(l, of_loop[l], loads + 6 * model_.n_joints());
+    store_loop_load(model_.loops.joints[l], of_loop[l], loads + 6 * (model_.n_joints() + l));
   // Couplings that repeat each other cancel in every joint, and leave rounding alone.
   double acting = 0, left = 0;
   for (const auto& member : groups_[g].members) acting = std::max(acting, size_of(member, f, q));

@@ -25,6 +25,9 @@ class LoopMetric {
   void calc(int l, const LoopState& loop, double* D) const;
   /// What the bodies of a joint yield to the wrench w, in F's axes.
   double yields(int l, const LoopState& loop, const Force<double>& w) const;
+  /// What the parent and the child of a joint yield to a wrench on them.
+  const Compliance<double>& of_parent(int l) const { return a_[l]; }
+  const Compliance<double>& of_child(int l) const { return b_[l]; }
 
  private:
   const Model& model_;

@@ -5,15 +5,11 @@
 #include <limits>
 
 #include "linkwise/base/finite.hpp"
+#include "linkwise/dynamics/loop_wrenches.hpp"
 #include "linkwise/recursion/tolerances.hpp"
 
 namespace linkwise {
 namespace {
-
-/// Pivots below this are zero, where D_A is 1: rounding errors leave 1e-16 of a zero.
-constexpr double null_pivot = 1e-10;
-/// A gap makes dependent constraints independent, by pivots of the order of its square.
-double null_for(double gap) { return std::clamp(100 * gap * gap, null_pivot, 1e-4); }
 
 /// Changes of f below the first are good enough to end a refinement, above the second they are no
 /// answer.
@@ -72,9 +68,7 @@ DynamicsReport LoopedConstraintForce::evaluate(double, const SweepInput<double>&
   const double gap = widest_miss(system_.loops(), false);
   loops_.open = std::max(gap, widest_miss(system_.loops(), true));
   DynamicsReport report;
-  if (factor_)
-    report.node =
-        factor_->factor(system_.A(), std::clamp(100 * gap * gap, null_pivot, 1e-4), least);
+  if (factor_) report.node = factor_->factor(system_.A(), null_pivot(gap), least);
   if (report.node >= 0)
     report.outcome =
         system_.A().all_finite() ? Outcome::not_positive_definite : Outcome::not_finite;
@@ -144,7 +138,7 @@ bool LoopedConstraintForce::respond(const double* q, const double* asked, double
   system_.assemble(in, asked);
   loops_ = {};
   const double gap = widest_miss(system_.loops(), false);
-  if (factor_ && factor_->factor(system_.A(), null_for(gap), false) >= 0) return false;
+  if (factor_ && factor_->factor(system_.A(), null_pivot(gap), false) >= 0) return false;
   if (!solve(system_.b(), f_, false).ok()) return false;
   describe(missed_);
   system_.recover(in, f_, du, nullptr);

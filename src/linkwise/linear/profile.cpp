@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 #include <utility>
 
 #include "linkwise/base/assert.hpp"
 #include "linkwise/linear/block.hpp"
-#include "linkwise/simd/lanes.hpp"
+#include "linkwise/simd/lane_memory.hpp"
 
 namespace linkwise {
 namespace {
@@ -26,17 +25,12 @@ double largest(const std::vector<double>& x) {
 
 using Wide = Lanes<native_lanes>;
 
-LW_INLINE Wide load(const double* from) {
-  Wide x;
-  std::memcpy(&x, from, sizeof x);
-  return x;
-}
-
 /// In a sum per lane.
 double product_of(const double* a, const double* b, int begin, int end) {
   Wide part = {};
   int i = begin;
-  for (; i + native_lanes <= end; i += native_lanes) part += load(a + i) * load(b + i);
+  for (; i + native_lanes <= end; i += native_lanes)
+    part += load_lanes<Wide>(a + i) * load_lanes<Wide>(b + i);
   double sum = 0;
   for (; i < end; ++i) sum += a[i] * b[i];
   for (int k = 0; k < native_lanes; ++k) sum += part[k];
@@ -50,8 +44,8 @@ void products_of(const double* const (&rows)[6], const double* other, int begin,
   Wide part[n] = {};
   int l = begin;
   for (; l + native_lanes <= end; l += native_lanes) {
-    const Wide x = load(other + l);
-    for (int i = 0; i < n; ++i) part[i] += load(rows[i] + l) * x;
+    const Wide x = load_lanes<Wide>(other + l);
+    for (int i = 0; i < n; ++i) part[i] += load_lanes<Wide>(rows[i] + l) * x;
   }
   for (int i = 0; i < n; ++i) {
     sums[i] = 0;

@@ -1,7 +1,8 @@
 #include "linkwise/linear/upper_rows.hpp"
 
 #include <algorithm>
-#include <cstring>
+
+#include "linkwise/simd/lane_memory.hpp"
 
 namespace linkwise {
 namespace {
@@ -9,16 +10,10 @@ namespace {
 constexpr int width = UpperRows::width;
 using Wide = UpperRows::Wide;
 
-LW_INLINE Wide load(const double* from) {
-  Wide x;
-  std::memcpy(&x, from, sizeof x);
-  return x;
-}
-LW_INLINE void store(double* to, const Wide& x) { std::memcpy(to, &x, sizeof x); }
-
 /// y[begin, end] -= k x[begin, end], and so behind the end, where x is zero.
 LW_INLINE void subtract(double* y, double k, const double* x, int begin, int end) {
-  for (int j = begin; j <= end; j += width) store(y + j, load(y + j) - k * load(x + j));
+  for (int j = begin; j <= end; j += width)
+    store_lanes(y + j, load_lanes<Wide>(y + j) - k * load_lanes<Wide>(x + j));
 }
 
 }  // namespace
@@ -55,7 +50,8 @@ void UpperRows::solve(double* x) const {
   for (int k = size(); k-- > 0;) {
     const double* const own = row(k);
     Wide sum{};
-    for (int j = k + 1; j <= last_[k]; j += width) sum += load(own + j) * load(x + j);
+    for (int j = k + 1; j <= last_[k]; j += width)
+      sum += load_lanes<Wide>(own + j) * load_lanes<Wide>(x + j);
     double total = 0;
     for (int l = 0; l < width; ++l) total += sum[l];
     x[k] -= total * inverse_[k];

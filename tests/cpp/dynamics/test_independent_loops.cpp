@@ -70,15 +70,14 @@ TEST(IndependentLoops, WhatIsLeftOutIsMissed) {
   double size = 1;
   for (const double x : want) size = std::max(size, std::abs(x));
 
-  const Inertia<double> unit{1, {}, {{1, 0, 1, 0, 0, 1}}};
-  const std::vector<Compliance<double>> yields{invert_inertia(unit)}, none(1);
+  const LoopMetric metric(model);
   const Motion<double> ground = ground_acceleration<double>(model, in.gravity_factor);
   const LoopStates& states = kernel.states();
   for (int left_out = -1; left_out < 6; ++left_out) {
     SCOPED_TRACE(left_out);
     std::vector<char> taken(6, 1);
     if (left_out >= 0) taken[left_out] = 0;
-    IndependentLoops loops(model, kernel.groups(), {taken}, none, yields);
+    IndependentLoops loops(model, kernel.groups(), {taken}, metric);
     TreeSweeps<double> sweeps(model);
     std::vector<double> du(model.nv());
     sweeps.start(false);
