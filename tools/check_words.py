@@ -1,7 +1,8 @@
 """Checks the words of comments, docstrings and documents.
 
-What they name as a file exists; the words that CONTRIBUTING.md asks to avoid do not occur, nor do
-the identifiers that the glossary has better words for. Run from anywhere: python
+What they name as a file exists, and what a comment of the core names as a function or a member; the
+words that CONTRIBUTING.md asks to avoid do not occur, nor do the identifiers that the glossary has
+better words for. Run from anywhere: python
 tools/check_words.py [repository]. Prints one line per violation and exits with status 1 when there
 is any.
 """
@@ -25,18 +26,23 @@ FOLDER = re.compile(
 )
 LINE_START = re.compile(r"\n\s*(?://[/!<]*|#:?|\")?")
 PLACEHOLDER = re.compile(r"(?:^|/)[A-Z]+$")
+#: A function or a data member in a comment of a C++ source: solve(), Model::load_index(), q_.
+MEMBER = re.compile(r"\b([A-Za-z]\w+)\(\)|\b([a-z]\w*_)(?![\w{])")
 LINK_TARGET = re.compile(r"\]\([^)\s]*\)")
 
 COUNT = r"one|none|two|three|four|five|six|some|few|dozen|once|twice|an?|\d[\d,]*(?:\.\d+)?"
 UNIT = (
     r"ns|[µu]s|ms|s|nanoseconds?|microseconds?|milliseconds?|bytes?|KB|MB|numbers?|instructions?"
-    r"|cycles?|operations?|flops|rows?|columns?|iterations?|evaluations?|calls?|reciprocals?"
+    r"|cycles?|operations?|flops|multiplications?|products?|rows?|columns?|iterations?|evaluations?"
+    r"|calls?|reciprocals?"
 )
 THING = (
     r"body|joint|link|lane|step|run|call|solve|state|evaluation|member|sample|iteration|row|column"
     r"|block|hinge|path|piece|system|core|thread|chain|machine|element|file|folder|degree"
     r")\b(?!\s+(?:may|can|must|has|is|takes|computes)\b"
 )
+#: What a number and its unit may be taken of besides, where nothing but "per" can be meant.
+PART = r"(?:\d+ [x\u00d7] \d+ )?(?:node|loop|knot|hub)\b"
 JOINING = (
     r"an?|the|and|are|as|at|be|by|for|from|has|have|if|in|into|is|it|makes?|need|needs|of|on|or|so"
     r"|takes?|than|that|to|when|where|which|with|without|was|were|but|not|per|between|over"
@@ -45,6 +51,7 @@ JOINING = (
 BANNED = {
     rf"\b(?:{COUNT})(?:\s+(?!(?:{JOINING})\b)[a-z][\w-]*)?\s+an?\s+(?:{THING})": 'write "per"',
     rf"\b(?:{UNIT})\s+an?\s+(?:{THING})": 'write "per"',
+    rf"\b(?:{UNIT})\s+an?\s+(?:{PART})": 'write "per"',
     r"(?<![Tt]here\s)\b(?:is|are|was)\s+none\b(?!\s+of)": 'write "there is no ..."',
 }
 #: Parts of identifiers that are no terms of the field.
@@ -74,6 +81,26 @@ def check_file_names(path: str, text: str, known: set[str]) -> list[str]:
         for number, name in file_names(text)
         if f"/{name}" not in known and f"/{folder}/{name}" not in known
     ]
+
+
+def check_members(path: str, said: str, known: set[str]) -> list[str]:
+    if Path(path).suffix not in CPP:
+        return []
+    return [
+        f"{path}:{line_of(said, match)}: {match[0]}: there is no such function or member"
+        for match in MEMBER.finditer(said)
+        if (match[1] or match[2]) not in known
+    ]
+
+
+def names_of(root: Path, paths: list[str]) -> set[str]:
+    """All identifiers of the repository's C++ and Python sources."""
+    found: set[str] = set()
+    for path in paths:
+        if Path(path).suffix in CPP | {".py"}:
+            text = (root / path).read_text(encoding="utf-8")
+            found.update(NAME.findall(cpp_code(text) if Path(path).suffix in CPP else text))
+    return found
 
 
 def endings(paths: list[str]) -> set[str]:
@@ -117,13 +144,14 @@ def check_identifiers(path: str, text: str) -> list[str]:
 
 
 def check(root: Path, paths: list[str]) -> list[str]:
-    violations, known = [], endings(paths)
+    violations, known, names = [], endings(paths), names_of(root, paths)
     for path in paths:
         if Path(path).suffix not in CPP | {".py", ".md"} or path in EXCEPT:
             continue
         text = (root / path).read_text(encoding="utf-8")
         said = LINK_TARGET.sub("]", prose(path, text))  # check_documents looks at links
         violations += check_file_names(path, said, known)
+        violations += check_members(path, said, names)
         violations += check_phrases(path, text)
         violations += check_identifiers(path, text)
     return violations

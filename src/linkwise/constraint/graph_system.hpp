@@ -72,7 +72,7 @@ class GraphSystem {
   void apply_torques(const double* tau);
   void apply_loop_torques(const SweepInput<double>& in);
   void finish_b();
-  /// tree_w_ and loop_w_ with what constraint forces add.
+  /// Adds to w_ and loop_w_ what constraint forces make of them.
   void add_forces(const std::vector<double>& f);
   /// a_ of the known wrenches and constraint forces.
   void calc_accelerations(const std::vector<double>& f);

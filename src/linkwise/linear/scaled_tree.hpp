@@ -2,9 +2,10 @@
 // A block tree scaled by its diagonal: with D_i = L_i L_i^T,
 //     A~ = L^-1 A L^-T = 1 + O,    b~ = L^-1 b,    x~ = L^T x.
 // Every method that the paper writes with D^-1 is the same method on A~ without it: no block solve
-// in the iteration, a product of 50 multiplications a 5 x 5 node, and the norm of a residual that
-// the preconditioner D induces is the plain Euclidean one. Hubs are scaled by a factor of their
-// compliance as well, C = R R^T, so that A~_is = H~_i H~_s^T and A~_ip = -H~_i K~^T.
+// in the iteration, and a product takes 50 multiplications per node of 5 x 5. The norm of a
+// residual that the preconditioner D induces is the plain Euclidean one. Hubs are scaled by a
+// factor of their compliance as well, C = R R^T, so that A~_is = H~_i H~_s^T and A~_ip = -H~_i
+// K~^T.
 
 #include <span>
 #include <vector>

@@ -10,7 +10,7 @@
 
 namespace linkwise {
 
-/// In the order of joint_type_table; models are stored with these numbers.
+/// In the order of joint_type_table. Models are stored with these numbers, so new types go last.
 enum class JointType {
   fixed,
   revolute,
@@ -43,7 +43,8 @@ struct LinkSpec {
   std::vector<double> parameters = {};  ///< of its kind, in the link frame
 };
 
-/// Properties that a joint has once per degree of freedom; one value stands for all of them.
+/// Properties that a joint has once per degree of freedom; one value stands for all of them. Models
+/// are stored with these numbers, so new ones go last.
 enum class DofProperty {
   damping,            ///< N m s/rad or N s/m
   friction,           ///< Coulomb level, N m or N

@@ -4,7 +4,7 @@
 // constraints demand is a difference of nearly equal numbers over the square of the distance, and
 // steps would become smaller without end. In a narrow window around such a position the
 // accelerations are those of the polynomial through the last ones before it, or of one through
-// positions beside it where these are far apart: see Simulation::accelerate_from_beside().
+// positions beside it where these are far apart: see Simulation::accelerate_beside().
 // A machine may also come close to such a position and turn away, or have loops that hold a
 // direction weakly all along. What the constraints demand is right there, and bends faster than a
 // polynomial. So the two are compared at every accepted state of the window: where they differ by

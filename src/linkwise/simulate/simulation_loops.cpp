@@ -11,6 +11,7 @@
 #include "linkwise/simulate/simulation.hpp"
 
 namespace linkwise {
+
 void Simulation::close_loops(double t0, const std::vector<std::string>& hold) {
   loops_.reset();
   assembled_.clear();
@@ -150,7 +151,8 @@ Coasting::Aside Simulation::demanded_aside(DynamicsMethod* method, double t, con
   return aside;
 }
 
-/// Of an accepted state.
+/// At an accepted state near a singular position: compares what the constraints demand there with
+/// the polynomial.
 void Simulation::coast_on(double t, const double* y) {
   coasting_.accepted();
   if (!coasting_.is_inside() || coasting_.follows()) return;
@@ -162,7 +164,7 @@ void Simulation::coast_on(double t, const double* y) {
   coasting_.compare(t, demanded_aside(aside_method_.get(), t, q, v));
 }
 
-/// The same of du_ and y_, which hold a state's rates.
+/// steer() for the sample in du_ and y_, which hold a state's rates.
 Outcome Simulation::steer_sample(double t, Outcome outcome) {
   if (outcome == Outcome::converged && loop_report_.strong >= loops_->full_rank()) return outcome;
   const double *q = y_.data(), *v = rates_in(q);
@@ -292,7 +294,7 @@ void Simulation::take_coupling_torques(std::span<const double> couplings) {
     }
 }
 
-/// Of an accepted state.
+/// At an accepted state: loop joints continue their turns from here.
 void Simulation::count_turns(double t, const double* y) {
   projected_.assign(y, y + size());
   to_state(projected_.data());

@@ -17,8 +17,8 @@ class GraphFactor {
   /// The structure of later systems. OutOfMemory where the factor does not fit.
   explicit GraphFactor(const BlockGraph& structure);
 
-  /// Pivots below `null` count as zero. least: solve_least() is asked for. Returns the node at
-  /// which the factorisation broke down, or -1.
+  /// Pivots below `null` count as zero. least: the least x will be asked of solve(). Returns the
+  /// node at which the factorisation broke down, or -1.
   int factor(const BlockGraph& A, double null, bool least);
 
   /// x solves A x = b but for what b demands of rows that are left out beyond the others; refined
@@ -59,7 +59,7 @@ class GraphFactor {
   std::vector<int> order_;       ///< of the nodes
   std::vector<int> place_;       ///< of each node: its first row in elimination order
   std::vector<int> offset_;      ///< of each node, as given
-  std::vector<double> scaling_;  ///< factor of D_A, 21 numbers a node
+  std::vector<double> scaling_;  ///< factor of D_A, 21 numbers per node
   std::vector<double> L_, inverse_, shifted_L_, shifted_inverse_;
   std::vector<double> front_, stack_, levers_, motions_;
   std::vector<int> local_;
