@@ -124,7 +124,7 @@ int widest(const Model& model, const LoopStates& states, bool of_rates) {
   return worst;
 }
 
-/// Of joints of given motion whose loops are one group with loop l.
+/// Names of the joints of given motion on loop l.
 std::vector<std::string> given_in_loop(const Model& model, const LoopStates& states, int l) {
   std::vector<std::string> given;
   const auto add = [&](const JointInfo& joint, const std::vector<Element>& elements) {

@@ -258,14 +258,13 @@ struct Evaluator::Pick {
 Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const DynamicsOptions& options,
                                 bool forces, Choice& choice) const {
   Pick picked;
-  const bool is_auto = options.method == "auto",
-             one_by_one = count == 1 || model_->is_constrained();
+  const bool is_auto = options.method == "auto", by_state = count == 1 || model_->is_constrained();
   // This path builds no text: that would take as long as the dynamics of a small machine.
   if ((is_auto || options.method == "articulated_body") && options.solver == "auto") {
     const Choice& by_default = workspace.default_choice();
-    choice.method = one_by_one && is_auto ? by_default.method : "articulated_body";
-    if (one_by_one && is_auto) choice.solver = by_default.solver;
-    if (one_by_one)
+    choice.method = by_state && is_auto ? by_default.method : "articulated_body";
+    if (by_state && is_auto) choice.solver = by_default.solver;
+    if (by_state)
       picked.method = &workspace.kept_method(options);
     else if (options.initial_guess != "zero")
       choose_dynamics(*model_, options);  // refuses unknown names
@@ -277,7 +276,7 @@ Evaluator::Pick Evaluator::pick(Workspace& workspace, size_t count, const Dynami
   }
   choice = choose_dynamics(*model_, options);
   const auto on_lanes = find_dynamics(choice.method).on_lanes;
-  if (!one_by_one && !forces && on_lanes && choice.solver == "thomas" &&
+  if (!by_state && !forces && on_lanes && choice.solver == "thomas" &&
       !ask_for_refinement(options.solver_options)) {
     require_regular_inertias(*model_);
     picked.on_lanes = *on_lanes;

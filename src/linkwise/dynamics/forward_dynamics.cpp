@@ -186,14 +186,6 @@ class WithArmatureBias final : public DynamicsMethod {
   std::vector<double> tau_;
 };
 
-}  // namespace
-
-std::span<const DynamicsEntry> dynamics_table() { return table; }
-
-const DynamicsEntry& find_dynamics(std::string_view name) {
-  return find_named("method", name, table, "auto");
-}
-
 std::string rounded(double x) {
   std::ostringstream text;
   text << std::setprecision(2) << x;
@@ -222,12 +214,20 @@ void choose_for_loops(const Model& model, Choice& choice) {
     choice.reason = "closed loops, of which the recursion carries the forces to where they meet";
 }
 
-/// A machine with closed loops is a graph.
+/// A machine with closed loops is a graph, which few solvers take.
 void require_solver_of_loops(const std::string& solver) {
   if (!find_solver(solver).takes_loops)
     throw InputError("solver '" + solver +
                      "' takes trees, and this machine has closed loops or couplings; use solver "
                      "thomas or conjugate_gradient");
+}
+
+}  // namespace
+
+std::span<const DynamicsEntry> dynamics_table() { return table; }
+
+const DynamicsEntry& find_dynamics(std::string_view name) {
+  return find_named("method", name, table, "auto");
 }
 
 Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <span>
 
+#include "linkwise/base/assert.hpp"
 #include "linkwise/joints/complement.hpp"
 #include "linkwise/joints/element.hpp"
 
@@ -139,16 +140,19 @@ inline bool can_close(std::span<const Element> stack) {
 
 /// Coordinates of the stack from the pose of F in E, E -> F, into q at the elements' places. Those
 /// of prescribed elements are given and stay. q holds the last values: angles are continued from
-/// them, so that turns are counted, and of two quaternions the nearer one is taken.
+/// them, so that turns are counted, and of two quaternions the nearer one is taken. A stack that is
+/// not among those of can_close() needs a case here: check_forest() lets all types pass but
+/// composite ones.
 inline void closure_coordinates(std::span<const Element> stack, const Transform<double>& X_FE,
                                 double* q) {
   if (stack[0].prescribed) return;
-  if (stack.size() == 1)
-    closure::one_element(stack[0], X_FE, q);
-  else if (stack[0].kind == ElementKind::revolute)
-    closure::two_hinges(stack[0], stack[1], X_FE, q);
-  else
-    closure::slide_and_turn(stack[0], stack[1], X_FE, q);
+  if (stack.size() == 1) return closure::one_element(stack[0], X_FE, q);
+  LINKWISE_ASSERT(stack.size() == 2 && stack[1].kind == ElementKind::revolute,
+                  "this stack closes no loop");
+  if (stack[0].kind == ElementKind::revolute)
+    return closure::two_hinges(stack[0], stack[1], X_FE, q);
+  LINKWISE_ASSERT(stack[0].kind == ElementKind::prismatic, "this stack closes no loop");
+  closure::slide_and_turn(stack[0], stack[1], X_FE, q);
 }
 
 /// What the joint holds. Everything is in F's axes, at F.

@@ -217,8 +217,8 @@ void LoopStates::update_loop(int l, const LoopEnds& ends) {
   else
     update_distance(l, X_FE, loop.on_parent * ends.v_a, of_b);
   const LoopMiss gap = miss_of(out, out.gap), slip = miss_of(out, out.slip);
-  out.open = (gap.shift + gap.turn * out.length) / out.length;
-  out.opens = (slip.shift + slip.turn * out.length) / (out.speed + out.length);
+  out.relative_gap = (gap.shift + gap.turn * out.length) / out.length;
+  out.relative_slip = (slip.shift + slip.turn * out.length) / (out.speed + out.length);
 }
 
 /// Rows from the basis.
@@ -349,7 +349,7 @@ LoopMiss miss_of(const LoopState& state, const double* residuals) {
 double widest_miss(const LoopStates& states, bool of_rates) {
   double widest = 0;
   for (int l = 0; l < states.n(); ++l)
-    widest = std::max(widest, of_rates ? states[l].opens : states[l].open);
+    widest = std::max(widest, of_rates ? states[l].relative_slip : states[l].relative_gap);
   return widest;
 }
 
@@ -357,13 +357,13 @@ void require_closed(const Model& model, const LoopStates& states, const std::str
   constexpr double allowed = 1e-6;
   for (int l = 0; l < model.n_loops(); ++l) {
     const LoopState& loop = states[l];
-    if (!(loop.open <= allowed)) {
+    if (!(loop.relative_gap <= allowed)) {
       const LoopMiss gap = miss_of(loop, loop.gap);
       throw InputError(where + named(model, l) + " is open: what it joins is " +
                        rounded(1e3 * gap.shift) + " mm and " + rounded(gap.turn) +
                        " rad apart; give q that closes its loop");
     }
-    if (!(loop.opens <= allowed)) {
+    if (!(loop.relative_slip <= allowed)) {
       const LoopMiss slip = miss_of(loop, loop.slip);
       throw InputError(where + named(model, l) + " opens: what it joins parts by " +
                        rounded(slip.shift) + " m/s and " + rounded(slip.turn) +

@@ -54,7 +54,8 @@ struct LoopState {
   double slip[6];          ///< Q^T v_rel [held]: the rate of g where the gap is closed
   double speed;            ///< of the faster one of E and F at F, m/s; turns count by the length
   double length;           ///< m: how far the loop reaches, by which turns are compared
-  double open, opens;      ///< the gap over the length, and the slip over length and speed
+  double relative_gap;     ///< over the length
+  double relative_slip;    ///< over length and speed
 };
 
 /// What a sweep knows of the bodies that a loop joint joins: their frames against that of the body

@@ -21,7 +21,6 @@ void classify(const PlacedJoints& placed, BodyTopology& body, BodyConstants<doub
   const Element& e = placed.elements[body.first_element];
   body.q = e.q;
   body.v = e.v;
-  body.nq = e.nq;
   if (e.prescribed || e.nv != 1) return;
   constants.pitch = e.pitch;
   constants.armature = placed.dof[static_cast<int>(DofProperty::armature)][e.v];

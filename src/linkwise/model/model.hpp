@@ -30,7 +30,8 @@ struct BodyTopology {
   BodyKind body_kind = BodyKind::rigid;
   int of_kind = -1;  ///< index among the bodies of its kind, unless rigid
   int first_element = 0, n_elements = 0;
-  int q = 0, nq = 0, v = 0, nv = 0;
+  int q = 0, v = 0;  ///< of bodies on one element; the others have those of their elements
+  int nv = 0;        ///< of the whole stack
   int n_children = 0;
   int general = -1;  ///< index among bodies of kind general
 };
@@ -83,8 +84,8 @@ struct JointInfo {
   bool last_of_body = true;   ///< its frame is the body's frame
 };
 
-/// A joint that closes a loop of the tree. Its coordinates follow from those of the tree: it stands
-/// where the frame F of its child and what its elements make of the frame E of its parent meet.
+/// A joint that closes a loop of the tree. Its coordinates follow from those of the tree: they are
+/// those by which its elements take the frame E of its parent nearest to the frame F of its child.
 struct LoopJoint {
   JointInfo joint;       ///< its body is the child's, -1: ground; q, v, elements as in LoopJoints
   int parent_body = -1;  ///< -1: ground
@@ -106,7 +107,7 @@ struct LoopJoints {
 /// Sum of polynomials of coordinates = offset.
 struct Coupling {
   struct Term {
-    int joint;            ///< row of its load: joints that close loops stand last
+    int joint;            ///< row of its load, as Model::joint_at() takes it
     int body;             ///< that the joint belongs to
     int q, v;             ///< its coordinate and rate, in the tree's or in loop joints'
     double factor;        ///< of the coordinate
@@ -134,8 +135,9 @@ struct Bearing {
   Vec3<double> axis;        ///< of unit length
   double across, along;     ///< m/N, to a force; 0: rigid
   double tilting, turning;  ///< rad/(N m), to a moment across and about the axis
-  /// What its child is out of place by without load [m, rad], and the force whose share of that is
-  /// what it yields to it [N]: in the parent's axes of the joint. Of a rod z is along it.
+  /// Of a misfit, in the parent's axes of the joint, where z is along a rod. offset [m] and turn
+  /// [rad]: where its child stands without load, past where the joint has it. preload [N]: a force;
+  /// what the bearing yields to it is a misfit as well.
   Vec3<double> offset{}, turn{}, preload{};
   bool has_misfit = false;
 };
