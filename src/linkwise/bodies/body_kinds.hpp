@@ -35,8 +35,8 @@ concept BodyPorts = requires(const B& body, const RigidBody<double>& link, const
   { compliance(body, inboard, X) } -> std::same_as<Matrix6<double>>;
   { compliance(body, from_inboard, X) } -> std::same_as<Matrix6<double>>;
   { moved(body, X) } -> std::same_as<B>;
-  // The pose of a joint starts from its placement. A port that moves on its body must be asked for
-  // its frame there first, in calc_general_state().
+  // The pose of a joint starts from its placement, which is a constant of one-axis joints. What a
+  // port that moves on its body takes is in docs/extending.md.
   requires B::ports_are_fixed;
   requires !has_coordinates<B> || AnswersForCoordinates<B>;
 };

@@ -4,10 +4,13 @@
 // round: its coordinates and its load stay those of its child against its parent.
 //
 // A link that is the child of several joints hangs on one of them; the others are loop joints.
-// They are, besides joints that are given as such, in this order of preference: joints that are not
-// fixed (the frame at the other end of a link stays on it), joints that do not act along their
-// coordinates, joints with more freedom (fewer loads to find), joints whose parent is further from
-// the ground (short loops), and joints that come later in the file.
+// Joints that are given as such are loop joints in any case. The others are chosen in this order:
+//     those that can close a loop
+//     those that are not fixed: the frame at the other end of a link stays on it
+//     those that do not act along their coordinates
+//     those with more freedom: fewer loads to find
+//     those whose parent is further from the ground: short loops
+//     those that come later in the file
 #include <vector>
 
 #include "linkwise/graph/machine_graph.hpp"

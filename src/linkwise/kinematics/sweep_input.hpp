@@ -23,7 +23,7 @@ struct SweepInput {
   /// zero, and prescribed loop joints stand and move as the tree makes them.
   const S* loop_q = nullptr;
   /// Rates, beside loop_q, and accelerations of prescribed loop joints, [nv] of loop joints; null:
-  /// zero.
+  /// zero. loop_du is to loop joints what `prescribed` is to those of the tree.
   const S* loop_v = nullptr;
   const S* loop_du = nullptr;
   /// Who wants to know the loop joints' states; a method that does not find them itself leaves this

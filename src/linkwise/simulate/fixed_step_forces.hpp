@@ -3,9 +3,9 @@
 //
 // A fixed step has no error test. What a step of length h does to a rate v and a coordinate q is
 // compared with the trapezoidal rule and with the cubic through both ends,
-//     dv = v1 - v0 - h/2 (a0 + a1),   dq = q1 - q0 - h/2 (v0 + v1) + h^2/12 (a1 - a0),
-// and the difference is turned into a force by the gains: at once, F(q1 + dq, v1 + dv) - F(q1, v1),
-// and where a spring or stop of stiffness k brings the inertia m = 1 / (H^-1)_ii to rest,
+//     dv = v1 - v0 - h/2 (a0 + a1),   dq = q1 - q0 - h/2 (v0 + v1) + h^2/12 (a1 - a0).
+// The gains turn the difference into a force: at once into F(q1 + dq, v1 + dv) - F(q1, v1), and
+// where a spring or stop of stiffness k brings the inertia m = 1 / (H^-1)_ii to rest, into
 // sqrt(k m) dv. The rule is coarser than the methods, so that it sees what they do not resolve
 // before it hurts, and says nothing where they do.
 // A stop that begins to push within a step acts from some time of it on, which methods do not know.
