@@ -61,11 +61,32 @@ def test_a_pulse_on_a_machine_at_rest(rotor, integrator, tolerance):
     assert run.position[-1, 0] == pytest.approx(expected, abs=20 * tolerance)
 
 
-@pytest.mark.parametrize("width", [1.0, 1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("width", [1.0, 1e-2, 1e-4, 1e-6, 1e-8, 1e-9])
 def test_pulses_of_any_width(rotor, width):
     drive = lw.Torque(pulse(7.3, width, 1 / width, 1000, ramp=width / 100))
     run = lw.simulate(rotor, times=[0, 1000], drives={"axle": drive})
     assert run.velocity[-1, 0] == pytest.approx(1 / INERTIA, rel=1e-5)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize("width", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+def test_a_blow_is_felt_or_said(rotor, width, tolerance):
+    """1 N m s at rest: however short, it turns the rotor, or the run says that it cannot.
+
+    The times of the table are doubles, and so is its width: the blow is what they make of it.
+    """
+    table = pulse(7.3, width, 1 / width, 20, ramp=width / 100)
+    blow = np.trapezoid(np.ravel(table.values), np.ravel(table.times))
+    times = np.spacing(7.3) / width
+    options = {"tolerance": tolerance, "on_failure": "return"}
+    options["drives"] = {"axle": lw.Torque(table)}
+    run = lw.simulate(rotor, times=[0, 20], **options)
+    if run.outcome == "converged":
+        rel = max(50 * tolerance, 100 * times, 1e-6)
+        assert float(run.velocity[-1, 0]) == pytest.approx(blow / INERTIA, rel=rel)
+    else:
+        assert run.outcome == "step_too_small"
+        assert width < 1e-8
 
 
 def wrench_of(table):

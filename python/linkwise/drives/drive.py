@@ -475,6 +475,8 @@ def as_drive(value: Any) -> Drive:
 
     Everything but a Drive is a torque.
     """
+    if value is None:
+        raise InputError("None given; give a drive, a number, a table or a function")
     return value if isinstance(value, Drive) else Torque(value)
 
 

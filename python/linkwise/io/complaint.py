@@ -87,3 +87,11 @@ def complain(
 ) -> NoReturn:
     """Raise :func:`complaint`."""
     raise complaint(source, element, problem, remedy, line)
+
+
+def check_path(name: str, path: object) -> None:
+    """InputError where `path` is nothing that can name a file."""
+    if not isinstance(path, str | os.PathLike) or not isinstance(os.fspath(path), str):
+        raise InputError(f"{name}: is a {type(path).__name__}; give a path")
+    if "\0" in os.fspath(path):
+        raise InputError(f"{name}: the path holds a NUL character; delete it")

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError, Model, as_floats
-from linkwise.io.complaint import check_flag, complain, shorten
+from linkwise.io.complaint import check_flag, check_path, complain, shorten
 from linkwise.io.mjcf_equalities import Equality
 from linkwise.io.urdf import JointOrder, Mimic, read_urdf
 from linkwise.io.xml import local_name, parse_xml
@@ -68,6 +68,9 @@ def load(
     _check_choice(path, "equality", equality, get_args(Equality))
     check_flag("floating_base", floating_base)
     check_flag("keep_fixed", keep_fixed)
+    check_path("model file", path)
+    if isinstance(package_dirs, str | os.PathLike):
+        package_dirs = (package_dirs,)
     for directory in package_dirs:
         if not os.path.isdir(directory):
             complain(

@@ -21,6 +21,7 @@ from linkwise.base import Array
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.mjcf_equalities import Equalities, Equality
 from linkwise.io.mjcf_transmissions import Transmissions, without_warnings
+from linkwise.io.unit_hints import FAR, unit_hints
 
 KINDS = ("floating", "spherical", "prismatic", "revolute")
 """Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
@@ -53,6 +54,7 @@ def read_mjcf(
     try:
         added = Transmissions(mj_model)
         notes = [*_ignored(mj_model), *added.notes(), *_joint_notes(mj_model, names)]
+        notes += _unit_notes(mj_model, names)
         with np.errstate(all="ignore"):  # the builder refuses what is no number, with its name
             _add_bodies(builder, mj_model, names, added)
             if equality == "exact":
@@ -212,6 +214,25 @@ def _add_bodies(builder: ModelBuilder, mj_model: Any, names: Names, added: Trans
             )
             inboard, before = child, anchor
             placed = {"rotation": np.eye(3), "translation": np.zeros(3)}
+
+
+def _unit_notes(mj_model: Any, names: Names) -> list[tuple[str, str, str]]:
+    """Hints at units of masses that the file gives; what has a geom of its size is no slip."""
+    bodies = range(1, mj_model.nbody)
+    joints, inertials = [], {}
+    for body in bodies:
+        floats = any(KINDS[mj_model.jnt_type[j]] == "floating" for j in joints_of(mj_model, body))
+        length = 0.0 if floats else float(np.linalg.norm(mj_model.body_pos[body]))
+        parent = int(mj_model.body_parentid[body])
+        joints.append((names.body[parent], names.body[body], length))
+        first = int(mj_model.body_geomadr[body])
+        geoms = slice(first, first + int(mj_model.body_geomnum[body]))
+        size = np.linalg.norm(mj_model.geom_pos[geoms], axis=1) + mj_model.geom_rbound[geoms]
+        mass, com = float(mj_model.body_mass[body]), mj_model.body_ipos[body]
+        moments = mj_model.body_inertia[body]
+        if np.sum(moments) / 2 > mass * (FAR * np.max(size, initial=0.0)) ** 2:
+            inertials[names.body[body]] = mass, com, np.diag(moments)
+    return [("warning", name, text) for name, text in unit_hints(joints, inertials)]
 
 
 def _add_loops(builder: ModelBuilder, mj_model: Any, names: Names, closing: Equalities) -> None:

@@ -8,6 +8,10 @@ import re
 from linkwise.io.complaint import shorten
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\Z")
+#: A number with something behind it, as in 2 kg, 90deg, 2.0f, 100%.
+_WITH_UNIT = re.compile(
+    r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*[a-zA-Z%\xb0]+\S*\Z"
+)
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)\Z", re.IGNORECASE)
 #: What people write instead, and what belongs there.
 _HINTS = {
@@ -32,6 +36,9 @@ def parse_number(text: str) -> float:
         if _NOT_FINITE.match(stripped):
             raise ValueError(f"'{shorten(stripped)}' is not a finite number")
         hint = next((text for mark, text in _HINTS.items() if mark in stripped), "")
+        if not hint and (number := _WITH_UNIT.match(stripped)) and stripped[1:2] not in ("x", "X"):
+            hint = f", it has '{shorten(stripped[number.end(1) :].strip())}' behind it: write the "
+            hint += "number alone"
         raise ValueError(f"'{shorten(stripped)}' is not a number{hint}")
     value = float(stripped)
     if math.isinf(value):

@@ -24,6 +24,7 @@ from linkwise.base import Array
 from linkwise.io.building import build, refuse_mimic_cycle
 from linkwise.io.complaint import complain, file_name, shorten
 from linkwise.io.sdf_frames import MODEL, WORLD, Frames, SdfElement, pose_of, quaternion_of
+from linkwise.io.unit_hints import Inertial, unit_hints
 from linkwise.io.urdf import MIMIC_REMEDY, MISSING_LEADER, Mimic
 from linkwise.io.xml import is_foreign, local_name
 
@@ -107,6 +108,7 @@ class _Reader:
         self._frames = Frames()
         self._joints: list[SdfElement] = []
         self._couplings: list[tuple[str, dict[str, float], float]] = []
+        self._inertials: dict[str, Inertial] = {}
         self._leaders: dict[str, str] = {}
         self._follower: dict[str, SdfElement] = {}
         self._check_version(root)
@@ -287,8 +289,10 @@ class _Reader:
             builder.add_joint(free, "floating", WORLD, name, initial=start)
             text = f"link '{shorten(name)}' is not joined to the world: it floats"
             self._notes.append(("info", free, text))
+        reach = []
         for joint in joints:
             at = np.linalg.inv(frames[joint.parent]) @ joint.pose
+            reach.append((joint.parent, joint.child, math.hypot(*at[:3, 3])))
             placed = {"rotation": at[:3, :3], "translation": at[:3, 3], **joint.properties}
             if hangs_on.get(joint.child) is joint:
                 builder.add_joint(joint.name, joint.type, joint.parent, joint.child, **placed)
@@ -303,7 +307,8 @@ class _Reader:
                 child_translation=there[:3, 3],
                 **placed,
             )
-
+        for body, text in unit_hints((r for r in reach if r[0] != WORLD), self._inertials):
+            self._warn(body, text)
         refuse_mimic_cycle(self._leaders, self._follower)
         for coupling, factors, offset in self._couplings:
             builder.add_coupling(coupling, factors, offset=offset)
@@ -401,6 +406,7 @@ class _Reader:
         inertia = turned @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turned.T
         inertia = 0.5 * inertia + 0.5 * inertia.T
         builder.add_link(name, mass=mass, com=placed[:3, 3], inertia=inertia)
+        self._inertials[name] = mass, placed[:3, 3], inertia
 
     def _joint(self, element: SdfElement) -> SdfJoint:
         name, kind = element.full(str(element.get("name"))), element.get("type")

@@ -19,6 +19,7 @@ from linkwise._core import Model, ModelBuilder
 from linkwise.base import Array
 from linkwise.io.building import build, refuse_mimic_cycle
 from linkwise.io.complaint import complain, file_name, shorten
+from linkwise.io.unit_hints import unit_hints
 from linkwise.io.urdf_elements import UrdfElement
 from linkwise.io.urdf_transmissions import Transmissions
 from linkwise.io.urdf_vocabulary import ATTRIBUTES, Vocabulary
@@ -36,8 +37,6 @@ MISSING_LEADER = 'name a joint, or let it move on its own with mimic="independen
 JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 _LIMITED = ("revolute", "prismatic")
 _LIMITS = ("lower", "upper", "effort", "velocity")
-#: A radius of gyration that many times the largest distance in the machine is a slip of units.
-_FAR = 5.0
 _WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
 _INERTIA = ATTRIBUTES["inertia"]
 
@@ -168,7 +167,10 @@ class _Reader:
         name, kind = str(element.get("name")), element.get("type")
         if kind not in JOINT_TYPES:
             problem = "has no type" if kind is None else f"unknown type '{shorten(kind)}'"
-            element.fail(problem, f"use one of {', '.join(JOINT_TYPES)}")
+            remedy = f"use one of {', '.join(JOINT_TYPES)}"
+            if kind and kind.lower() in JOINT_TYPES:
+                remedy = f"did you mean '{kind.lower()}'?"
+            element.fail(problem, remedy)
         ends = {}
         for role in ("parent", "child"):
             end = element.child(role)
@@ -286,27 +288,13 @@ class _Reader:
         self.notes += rotors.notes()
 
     def note_units(self, joints: list[UrdfJoint]) -> None:
-        """Warn of inertias that no body of the link's size can have: units, or a default of 1."""
-        reach: dict[str, float] = {}
-        for joint in joints:
-            length = math.hypot(*joint.properties.get("translation", np.zeros(3)))
-            for link in (joint.parent, joint.child):
-                reach[link] = max(reach.get(link, 0.0), length)
-        largest = max(reach.values(), default=0.0)
-        for name, (mass, com, inertia) in self._inertials.items():
-            size = max(reach.get(name, 0.0), largest, math.hypot(*com))
-            if mass <= 0 or size == 0:
-                continue
-            radius = math.sqrt(max(0.0, float(np.trace(inertia)) / 2 / mass))
-            if radius > _FAR * size:
-                guess = "1 kg m2 is what many exporters write by default"
-                if not np.allclose(inertia, np.eye(3)):
-                    guess = "inertias are kg m2 (1 kg mm2 = 1e-6 kg m2, 1 g mm2 = 1e-9 kg m2)"
-                self._note(
-                    name,
-                    f"radius of gyration {radius:.3g} m, far beyond a machine whose joints are at "
-                    f"most {size:.3g} m apart; check the units of mass and inertia: {guess}",
-                )
+        """Warn of inertias and centres of mass that no body of the machine's size can have."""
+        lengths = (
+            (j.parent, j.child, math.hypot(*j.properties.get("translation", np.zeros(3))))
+            for j in joints
+        )
+        for name, text in unit_hints(lengths, self._inertials):
+            self._note(name, text)
 
     def note_what_is_left_out(self) -> None:
         # A target that does not exist is no error: the coupling is not used either way.

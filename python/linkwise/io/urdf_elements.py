@@ -17,6 +17,9 @@ from linkwise.io.complaint import complain
 from linkwise.io.numbers import parse_number, parse_numbers
 from linkwise.io.xml import is_foreign, local_name
 
+#: How programs write infinity: C, Windows' C, YAML, Python's and JavaScript's.
+_INFINITE = ("inf", "infinity", "1.#inf", "1.#inf00", ".inf", "math.inf", "infty", "∞")
+
 
 def placement(xyz: Array | list[float], rpy: Array | list[float]) -> Array:
     """The pose (4, 4) of an <origin>: turned by roll, pitch, yaw about fixed axes, then moved."""
@@ -86,7 +89,7 @@ class UrdfElement:
         """A limit, None where it means unlimited: infinite (on the side of ``sign``), or, without a
         sign, -1, as some simulators write it."""
         text = (self.get(attribute) or "").strip().lower()
-        infinite = text.lstrip("+-") in ("inf", "infinity", "1.#inf")
+        infinite = text.lstrip("+-") in _INFINITE
         if infinite and (text[0] == "-") == (sign < 0):
             return None
         value = self.number(attribute, f"{attribute} limit")

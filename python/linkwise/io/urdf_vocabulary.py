@@ -62,7 +62,7 @@ _PLACES = {
 _HARMLESS = {
     "robot": "gazebo transmission sensor ros2_control group_state plugin author license "
     "version actuator camera link_name disable_collisions end_effector virtual_joint group "
-    "passive_joint loop_joint lidar motor_group property",
+    "passive_joint lidar motor_group property",
     "link": "contact material self_collision_checking audio verbose sensor name",
     "joint": "safety_controller calibration hardwareInterface safety material sensor visual",
     "limit": "acceleration deceleration jerk soft_lower soft_upper soft_lower_limit "
@@ -76,6 +76,26 @@ _MACROS = ("insert_block", "include", "macro")
 #: What Gazebo adds to links and joints by its own elements.
 _OF_GAZEBO = "joint springStiffness springReference dampingFactor inertial mass stiffness damping"
 _SWITCHES = ("turnGravityOff", "kinematic")
+#: Of other programs, with a prefix or without: they carry dynamics, and what stands for them here.
+_FORCES_AND_LOOPS = {
+    "linear_bushing_rpy": "[bearing.JOINT] or a joint with springs and dampers",
+    "linear_spring_damper": "[spring.NAME]",
+    "revolute_spring": "[joint.JOINT] stiffness",
+    "prismatic_spring": "[joint.JOINT] stiffness",
+    "force_element": "[spring.NAME] or [joint.JOINT]",
+    "ball_constraint": "[loop.NAME] with a spherical joint",
+    "loop_joint": "[loop.NAME]",
+    "loop": "[loop.NAME]",
+    "constraint": "[loop.NAME]",
+    "screw_thread_pitch": "a helical joint of linkwise.ModelBuilder",
+    "damping": "<dynamics>",
+    "friction": "<dynamics>",
+    "stiffness": "[joint.JOINT] stiffness",
+    "spring": "[spring.NAME] or [joint.JOINT] stiffness",
+    "gear_ratio": "[joint.JOINT] gear_ratio with motor_inertia",
+    "rotor_inertia": "[joint.JOINT] motor_inertia with gear_ratio",
+    "armature": "[joint.JOINT] armature",
+}
 
 
 class Vocabulary:
@@ -138,7 +158,7 @@ class Vocabulary:
         if is_foreign(element, self._root):
             if tag in _PLACES:
                 self._refuse_extension(element)
-            self._harmless[f"<{shorten(tag)}>"] += 1
+            self._of_another_program("robot", element, f"<{shorten(tag)}>")
         elif tag in ("link", "joint"):
             self._inside(element, f"{tag} '{shorten(element.get('name', ''))}'")
         elif tag in ("material", "transmission"):  # urdf_transmissions reads the latter
@@ -153,7 +173,7 @@ class Vocabulary:
             elif tag not in _WITH_THEIR_OWN:
                 self._refuse_pieces_in(element)
             if tag not in _HARMLESS["robot"].split():
-                self._warn("robot", element, f"unknown element <{_shown(element)}> is not read")
+                self._unknown("robot", element)
                 return
             self._harmless[f"<{shorten(tag)}>"] += 1
 
@@ -188,9 +208,9 @@ class Vocabulary:
         for child in element.iterchildren(etree.Element):
             tag = local_name(child)
             if is_foreign(child, self._root):
-                if tag in _PLACES:
+                if tag in _PLACES and tag not in _FORCES_AND_LOOPS:
                     self._refuse_extension(child)
-                self._harmless[f"<{shorten(tag)}> of a {kind}"] += 1
+                self._of_another_program(title, child, f"<{shorten(tag)}> of a {kind}")
             elif tag in _MACROS:
                 self._refuse_macro(child)
             elif tag in ("visual", "collision") and kind == "link":
@@ -202,7 +222,25 @@ class Vocabulary:
             elif tag in _HARMLESS.get(kind, "").split():
                 self._harmless[f"<{shorten(tag)}> of a {kind}"] += 1
             else:
-                self._warn(title, child, f"unknown element <{_shown(child)}> is not read")
+                self._unknown(title, child, _CHILDREN[kind])
+
+    def _unknown(self, title: str, element: etree._Element, known: tuple[str, ...] = ()) -> None:
+        """A warning, with what stands for the element here, or the nearest known name."""
+        tag = local_name(element)
+        text = f"unknown element <{_shown(element)}> is not read"
+        hint = near(tag, known) if known else ""
+        if tag in _FORCES_AND_LOOPS:
+            hint = f"it acts on the machine: write {_FORCES_AND_LOOPS[tag]} instead"
+        elif not hint.startswith("did"):
+            hint = ""
+        self._warn(title, element, f"{text}; {hint}" if hint else text)
+
+    def _of_another_program(self, title: str, element: etree._Element, counted: str) -> None:
+        """An element with a prefix: a warning where it acts on the machine, else it is counted."""
+        if local_name(element) in _FORCES_AND_LOOPS:
+            self._unknown(title, element)
+        else:
+            self._harmless[counted] += 1
 
     def _misplaced(self, element: etree._Element) -> None:
         place = _PLACES.get(local_name(element), "joint> or <inertial")
@@ -219,7 +257,7 @@ class Vocabulary:
         for child in element.iterchildren(etree.Element):
             name = local_name(child)
             if is_foreign(child, self._root):
-                self._harmless[f"<{shorten(name)}> of a {tag}"] += 1
+                self._of_another_program(title, child, f"<{shorten(name)}> of a {tag}")
             elif name in _MACROS:
                 self._refuse_macro(child)
             elif name in ATTRIBUTES[tag]:
@@ -232,7 +270,10 @@ class Vocabulary:
                 self._warn(title, child, text)
         texts = [element.text, *(child.tail for child in element)]
         said = " ".join(filter(None, (shorten(text or "") for text in texts)))
-        if said and tag != "mass":
+        if said and tag == "mass" and element.get("value") is None:
+            text = "<mass> gives value as text, which other readers skip; it is read"
+            self._warn(title, element, text)
+        elif said:
             name = ATTRIBUTES[tag][0]
             self._refuse(
                 element,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwise._core import InputError
+from linkwise.io.complaint import check_path
 from linkwise.io.files import read_bytes
 from linkwise.record.provenance import FORMAT_KEY
 
@@ -80,6 +81,7 @@ def is_being_written(path: Path) -> bool:
 
 def check_target(path: str | os.PathLike[str]) -> None:
     """Refuse an output path that must not or cannot be written; nothing is created."""
+    check_path("output", path)
     target = Path(path)
     shown = f"output {str(path)!r}"
     if not target.name:

@@ -13,7 +13,7 @@ import numpy as np
 
 from linkwise._core import InputError
 from linkwise.base import blocks
-from linkwise.io.complaint import shown
+from linkwise.io.complaint import check_path, shown
 from linkwise.io.writing import csv_cell, written_whole
 from linkwise.record.extremes import PREFIX, ROWS
 from linkwise.record.schema import DETERMINATE, TABLE
@@ -40,6 +40,7 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """All variables, block by block: a stored run may be larger than memory."""
     import h5netcdf
 
+    check_path("path", path)
     target = Path(os.path.abspath(path))
     # HDF5 that finds no room leaves the process in a state in which it crashes later.
     size = sum(variable.nbytes for variable in dataset.variables.values()) + _NETCDF_HEAD
@@ -144,6 +145,7 @@ def _write_extremes(dataset: xr.Dataset, names: list[str], path: Path) -> None:
 def write_csv(
     dataset: xr.Dataset, path: str | os.PathLike[str], quantity: str | None
 ) -> list[Path]:
+    check_path("path", path)
     target = Path(os.path.abspath(path))
     tables: dict[str, list[str]] = {}
     for key, variable in dataset.data_vars.items():

@@ -7,6 +7,7 @@ import warnings
 from pathlib import Path
 
 from linkwise._core import InputError
+from linkwise.io.complaint import check_path
 from linkwise.record.checksums import LIST
 from linkwise.record.claim import is_being_written, run_attributes
 from linkwise.record.provenance import FORMAT_KEY, FORMAT_VERSION, UNFINISHED
@@ -27,6 +28,7 @@ def open_run(path: str | os.PathLike[str]) -> Run:
 
     A run whose list of checksums is missing is read with a warning.
     """
+    check_path("run", path)
     where = Path(os.path.abspath(path))
     shown = f"run {str(path)!r}"
     restore(where)

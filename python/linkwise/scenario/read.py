@@ -31,6 +31,7 @@ from linkwise.scenario.arguments import (
     with_properties,
 )
 from linkwise.scenario.schema import RatingsFile, ScenarioFile, describe, keys_at
+from linkwise.scenario.toml_slips import diagnose
 
 #: Keys that say how a model file is loaded.
 _OF_MODEL_FILES = (
@@ -260,8 +261,13 @@ def _read_toml(path: str | os.PathLike[str], data: bytes) -> tuple[str, dict[str
         match = re.search(r"\(at line (\d+), column \d+\)\Z", str(error))
         problem = re.sub(r" \(at [^()]*\)\Z", "", str(error))
         line_number = int(match.group(1)) if match else None
-        problem = f"is not valid TOML ({shorten(problem, 120)})"
-        complain(path, "scenario", problem, "correct the syntax", line_number)
+        found = diagnose(text, line_number)
+        problem, remedy = found or (f"({shorten(problem, 120)})", "correct the syntax")
+        if not problem.startswith("is "):
+            problem = (
+                f"is not valid TOML: it {problem}" if found else f"is not valid TOML {problem}"
+            )
+        complain(path, "scenario", problem, remedy, line_number)
     except (RecursionError, ValueError) as error:
         # ValueError: Python refuses integers of thousands of digits.
         problem = f"cannot be read ({shorten(error, 120)})"

@@ -550,6 +550,10 @@ def describe(error: dict[str, Any]) -> tuple[tuple[str, ...], str, str]:
         problem, _, remedy = str(context["error"]).partition("; ")
         return path, problem, remedy or "give a finite number, with a unit if need be"
     if kind == "missing":
+        if location == ("simulate",):
+            return path, "is missing", "add [simulate] with duration = ... in s"
+        if location == ("model",):
+            return path, "is missing", 'add model = "FILE", above the first table'
         return path, "is missing", f"add {location[-1]} = ..."
     if kind == "union_tag_not_found":
         return path, "has no kind", f"add kind = one of {', '.join(DRIVES)}"

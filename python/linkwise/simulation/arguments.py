@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from linkwise._core import InputError, as_floats
+from linkwise._core import InputError, Model, as_floats
 from linkwise.io.complaint import shown
 
 _DEFAULT_SAMPLES = 1000
@@ -41,6 +41,26 @@ def options_object(
         given = kind(**given)
     taken = {name: keywords.pop(name) for name in known if keywords and name in keywords}
     return replace(given or kind(), **taken)  # type: ignore[type-var]
+
+
+def check_called(model: object, progress: object) -> None:
+    """InputError where these are no model and no function."""
+    check_model(model)
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress: {shown(progress)} given; give a function")
+
+
+def check_model(model: object) -> None:
+    """InputError where `model` is something else, such as the path of a file."""
+    if not isinstance(model, Model):
+        raise InputError(
+            f"model: is a {type(model).__name__}; give a linkwise.Model, as linkwise.load returns"
+        )
+
+
+def check_mapping(name: str, given: object) -> None:
+    if given is not None and not isinstance(given, Mapping):
+        raise InputError(f"{name}: {shown(given)} given; give a dictionary by name")
 
 
 def number(name: str, value: Any) -> float:

@@ -14,7 +14,7 @@ from linkwise._core import InputError
 from linkwise.base import Array
 from linkwise.io.complaint import shown
 from linkwise.notes import Ignored
-from linkwise.simulation.arguments import state_vector
+from linkwise.simulation.arguments import check_mapping, state_vector
 
 if TYPE_CHECKING:
     from linkwise._core import Model
@@ -71,6 +71,7 @@ def assemble(
     q = state_vector("q0", q0, model.nq, model.initial_configuration())
     v = state_vector("v0", v0, model.nv, np.zeros(model.nv))
     held = held_joints(hold)
+    check_mapping("loop_position", loop_position)
     if not loop_position:
         found = _core.assemble(model, q, v, held)
         return Assembly(found["q"], found["v"], found["gap"], tuple(found["released"]))

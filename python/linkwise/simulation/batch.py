@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,13 @@ from linkwise.notes import Ignored, tell, warning_attrs, warnings_of
 from linkwise.record.provenance import plain, provenance
 from linkwise.record.schema import TABLE, TIME_ATTRS, Schema, build_schema
 from linkwise.results import Run
-from linkwise.simulation.arguments import check_steps, number, optional_count, sample_times
+from linkwise.simulation.arguments import (
+    check_model,
+    check_steps,
+    number,
+    optional_count,
+    sample_times,
+)
 from linkwise.simulation.determinacy import Determinacy, is_looked_at, not_looked_at
 from linkwise.simulation.recording import Recording
 from linkwise.simulation.simulate import (
@@ -37,6 +43,8 @@ QUANTITIES = tuple(dict.fromkeys(row["group"] for row in TABLE if row["of_member
 
 def _machines(model: Model | Sequence[Model]) -> list[Model]:
     """The models, alike in their joints."""
+    if isinstance(model, str) or not isinstance(model, Iterable | Model):
+        check_model(model)
     models = [model] if isinstance(model, Model) else list(model)
     if not models or not all(isinstance(one, Model) for one in models):
         raise InputError("model: give a Model, or a sequence of at least one")

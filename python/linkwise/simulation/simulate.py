@@ -28,6 +28,8 @@ from linkwise.record.schema import Schema, build_schema
 from linkwise.record.store import RunWriter
 from linkwise.results import Run
 from linkwise.simulation.arguments import (
+    check_called,
+    check_mapping,
     check_steps,
     optional_count,
     options_object,
@@ -72,10 +74,11 @@ def check_driven(
     """Drives by joint and wrenches by name, each with its frame; unknown names and unusable values
     are refused."""
     by_joint, by_name = {}, {}
-    for name, given in (("drives", drives), ("wrenches", wrenches)):
-        if given is not None and not isinstance(given, Mapping):
-            raise InputError(f"{name}: {shown(given)} given; give a dictionary by name")
+    check_mapping("drives", drives)
+    check_mapping("wrenches", wrenches)
     for joint, drive in (drives or {}).items():
+        if not isinstance(joint, str):
+            raise InputError(f"drives: {shown(joint)} names no joint; give names in quotes")
         model.load_index(joint)
         try:
             by_joint[joint] = as_drive(drive)
@@ -278,6 +281,20 @@ _UNKNOWN_WORKS = (
 )
 
 
+#: The share of a number that the error test allows always: 64 roundings.
+_FINEST = 64 * float(np.finfo(float).eps)
+
+
+def _fine(simulation: Simulation, options: Mapping[str, Any]) -> list[Ignored]:
+    """What is said of a tolerance that doubles cannot hold."""
+    fixed = {row["name"] for row in _core.integrators() if row["fixed_step"]}
+    least = simulation.step_tolerance
+    if least >= _FINEST / 10 or options.get("integrator", DEFAULTS["integrator"]) in fixed:
+        return []
+    text = f"steps are held to {_FINEST:.1e} of each number, the rounding of doubles, and not to "
+    return [Ignored("", "tolerance", f"{text}{least:.1e}; give 1e-13 or more")]
+
+
 def _coarse_solver(simulation: Simulation, options: Mapping[str, Any]) -> list[Ignored]:
     """What is said where the errors of an iterative solver are more than the error test bears.
 
@@ -329,12 +346,14 @@ def _attributes_at_end(simulation: Simulation, wall_time: float) -> dict[str, An
     }
 
 
-def _solver_doubt(options: Mapping[str, Any], allowed: float, error: float) -> Ignored | None:
+def _solver_doubt(options: Mapping[str, Any], default: float, error: float) -> Ignored | None:
     """What a run says of an iterative solver whose errors are too large or not known.
 
-    `error`: the largest of them, relative; infinite where it is not known. `allowed`: what the
-    solver was asked for. By the rule energy_norm it is known, and small enough.
+    `error`: the largest of them, relative; infinite where it is not known. `default`: what the
+    solver was asked for without `solver_tolerance`. By the rule energy_norm the error is known, and
+    small enough.
     """
+    allowed = options.get("solver_tolerance", default)
     rule = options.get("stop", DEFAULTS["stop"])
     if np.isfinite(error) and (rule == "energy_norm" or error <= 10 * allowed):
         return None
@@ -445,6 +464,7 @@ def simulate(
     whose gain is so large that they are not known well, loads of closed loops that rigid bodies do
     not determine (`run.determinate`), and an iterative solver whose errors are not bounded.
     """
+    check_called(model, progress)
     sampled = sample_times(duration, every, times)
     start, hold, brought = at_loop_positions(model, _start(model, q0, v0), hold, loop_position)
     by_joint, by_name = check_driven(model, drives, wrenches)
@@ -487,7 +507,7 @@ def simulate(
         cpu_target=_core.cpu_target,
     )
     attrs |= _chosen(simulation, by_joint, by_name)
-    notes += [*brought, *_of_loops(simulation, model, schema)]
+    notes += [*brought, *_of_loops(simulation, model, schema), *_fine(simulation, options)]
     looked = model, by_joint, simulation.start_position, sampled.size
     determinacy = Determinacy(*looked) if schema.marks else None
     ignored = [*notes, *_coarse_solver(simulation, options), *warnings_of(model)]
@@ -497,8 +517,7 @@ def simulate(
     tell(warnings_of(model), reading=False)
     timeless = partial(_timeless, simulation, schema, determinacy)
     recorder = _recorder(model, schema, attrs, sampled.size, output, timeless)
-    allowed = options.get("solver_tolerance", simulation.step_tolerance / 10)
-    doubt = partial(_solver_doubt, options, allowed)
+    doubt = partial(_solver_doubt, options, simulation.step_tolerance / 10)
     told = doubt, ignored, determinacy
     run, ending = _record(model, simulation, recorder, schema, sampled, progress, *told)
     if on_failure == "raise":

@@ -14,6 +14,9 @@ constexpr int nodes = 5;
 /// What an action of full size does within this time is the scale of its integral, or within this
 /// share of the table, if that is shorter.
 constexpr double scale_time = 0.1, scale_share = 0.01;
+/// The scale is no more than so many times the whole impulse, so that a hammer's blow of a
+/// microsecond, which is nothing beside its own force for a tenth of a second, is not passed over.
+constexpr double impulse_share = 10;
 /// From so many intervals on, the integral is looked at where the rows are, and not between.
 constexpr int enough_rows = 8;
 /// The share of the largest action by which it may change from one interval to the next, without
@@ -54,7 +57,7 @@ Integral::Integral(const Table& table, const TableAction& action, double toleran
   const size_t intervals = table.breaks.size() - 1, width = static_cast<size_t>(columns_);
   const double first = table.breaks.front(), span = table.breaks.back() - first;
   std::vector<double> value(width), rate(width), sum(width), start(width), at(width), held(width);
-  double largest_share = 0;
+  double largest_share = 0, impulse = 0;  // the latter of all columns, each taken as positive
   const auto act_at = [&](double t) {
     table.evaluate(t, value.data());
     table.evaluate(t, rate.data(), 1, true);
@@ -90,7 +93,9 @@ Integral::Integral(const Table& table, const TableAction& action, double toleran
         double integral = 0;
         for (int p = 0; p <= table.degree; ++p)
           integral = integral * x + row[p * width + c] / (table.degree - p + 1);
+        const double before = sum[c];
         sum[c] = start[c] + integral * x;
+        impulse += std::abs(action.value * (sum[c] - before));
       }
       const double t = k == per_interval ? table.breaks[i + 1] : from + x;
       act_at(t);
@@ -98,9 +103,13 @@ Integral::Integral(const Table& table, const TableAction& action, double toleran
     }
   }
   if (!action.extended) hold_value();
-  largest_ = std::max(largest_, action.least);
   const double time = std::min(scale_time, scale_share * span);
-  allowed_ = tolerance * (largest_ * time + largest_share * scale_time + action.floor);
+  double scale = largest_ * time;
+  if (action.rate == 0 && action.acceleration == 0)
+    scale = std::min(scale, impulse_share * impulse);
+  scale = std::max(scale, action.least * time);
+  largest_ = std::max(largest_, action.least);
+  allowed_ = tolerance * (scale + largest_share * scale_time + action.floor);
 }
 
 /// Goes on with a constant rate.

@@ -251,7 +251,8 @@ UNITS = "known units: rad, deg, rev, mrad, m, cm, mm, um, km, s, ms, min, h, "
         ),
         (
             "\n[rating.slide]\nforce = '3 N m'",
-            ": rating.slide.force: has a unit of moment where a force belongs; use one of N, kN",
+            ": rating.slide.force: has a unit of moment where a force belongs; use one of "
+            "N, kN, MN, mN",
         ),
         (
             "\n[drive.shoulder]\nvalue = 1",
@@ -285,7 +286,7 @@ UNITS = "known units: rad, deg, rev, mrad, m, cm, mm, um, km, s, ms, min, h, "
         (
             "\n[drive.shoulder]\nkind = 'torque'\nvalue = '3 N'",
             ": drive.shoulder.value: has a unit of force where a moment belongs; "
-            "use one of Nm, kNm, Nmm",
+            "use one of Nm, kNm, MNm, Ncm, Nmm, mNm",
         ),
         (
             "\n[drive.shoulder]\nkind = 'pd'\nkp = -1\nkd = 1\ntarget = 0",
@@ -337,8 +338,8 @@ def test_defect_is_named(write, complaint, text, expected):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("", ": model: is missing; add model = ..."),
-        ('model = "arm.urdf"', ": simulate: is missing; add simulate = ..."),
+        ("", ': model: is missing; add model = "FILE", above the first table'),
+        ('model = "arm.urdf"', ": simulate: is missing; add [simulate] with duration = ... in s"),
         ('model = "arm.urdf"\n[simulate]', ": simulate.duration: is missing; add duration = ..."),
         (
             'model = "arm.urdf"\n[simulate]\nduration = 0',
@@ -457,7 +458,7 @@ def test_column_in_the_wrong_unit(write, arm):
         read_all(path)
     assert str(caught.value) == (
         f"{arm.with_name('t.csv')}:1: column 'a': has a unit of length where a moment belongs; "
-        "use one of Nm, kNm, Nmm"
+        "use one of Nm, kNm, MNm, Ncm, Nmm, mNm"
     )
 
 

@@ -99,6 +99,16 @@ def test_damping_written_as_an_element_damps(tmp_path):
         ('<axis xyz="0 1 1"/>', '<axis xyz="0 1 1"><frame>b</frame></axis>', "<frame> in <axis>"),
         ("<dynamics damping", "<spring k='5'/><dynamics damping", "element <spring> is not read"),
         ("<inertial>", '<inertial mass="5">', "'mass' of <inertial>"),
+        ('<mass value="20"/>', "<mass>20</mass>", "<mass> gives value as text"),
+        ("<inertial>", "<Inertial/><inertial>", "did you mean 'inertial'"),
+        ("</robot>", '<loop_joint name="l" type="fixed"/></robot>', "write [loop.NAME] instead"),
+        (
+            "</robot>",
+            "<drake:linear_spring_damper/></robot>",
+            "<drake:linear_spring_damper> is not read; it acts on the machine",
+        ),
+        ("<dynamics", '<drake:screw_thread_pitch value="1"/><dynamics', "a helical joint"),
+        ("<dynamics", '<gear_ratio value="50"/><dynamics', "gear_ratio with motor_inertia"),
         ("<inertial>", '<box_inertia mass="5"/><inertial>', "element <box_inertia> is not read"),
         ("</robot>", '<frame name="tool"/></robot>', "element <frame> is not read"),
         (
@@ -177,6 +187,16 @@ def test_other_vocabularies_without_dynamics_are_counted(door):
     assert any(note.element == "<capsule>" for note in model.notes)
 
 
+def test_a_type_in_capitals_is_told_apart(door):
+    with pytest.raises(lw.InputError, match="unknown type 'Revolute'; did you mean 'revolute'"):
+        door('type="revolute"', 'type="Revolute"')
+
+
+def test_a_mass_as_text_and_as_attribute_is_refused(door):
+    with pytest.raises(lw.InputError, match="holds the text '21'"):
+        door('<mass value="20"/>', '<mass value="20">21</mass>')
+
+
 @pytest.mark.parametrize(
     ("mass", "moments", "hint"),
     [
@@ -192,3 +212,48 @@ def test_inertia_in_another_unit_is_hinted_at(door, mass, moments, hint):
     notes = [n for n in door(old, new.format(mass, *moments)).notes if "radius of" in n.text]
     assert [n.element for n in notes] == (["leaf"] if hint else [])
     assert hint is None or hint in notes[0].text
+
+
+def test_a_centre_of_mass_in_another_unit_is_hinted_at(door):
+    """400 mm written as 400, in a machine whose joint is 1 m from the ground."""
+    assert not [n for n in door().notes if "centre of mass" in n.text]
+    notes = [n for n in door('xyz="0.4 0 0"', 'xyz="400 0 0"').notes if "centre of" in n.text]
+    assert [(n.level, n.element) for n in notes] == [("warning", "leaf")]
+    assert "400 m from the link's frame" in notes[0].text
+    assert "1 mm = 0.001 m" in notes[0].text
+
+
+def in_sdf(moment):
+    return (
+        '<sdf version="1.9"><model name="m"><link name="a"/><link name="b"><pose>0 0 .5 0 0 0'
+        f"</pose><inertial><mass>0.2</mass><inertia><ixx>{moment}</ixx><iyy>{moment}</iyy>"
+        f"<izz>{moment}</izz></inertia></inertial></link>"
+        '<joint name="w" type="fixed"><parent>world</parent><child>a</child></joint>'
+        '<joint name="j" type="revolute"><parent>a</parent><child>b</child>'
+        "<axis><xyz>0 1 0</xyz></axis></joint></model></sdf>"
+    )
+
+
+def in_mjcf(moment, geom=""):
+    return (
+        '<mujoco><worldbody><body name="a"><inertial pos="0 0 0" mass="1" '
+        'diaginertia="0.01 0.01 0.01"/><joint axis="0 1 0"/><body name="b" pos="0 0 .5">'
+        f'<inertial pos="0 0 0" mass=".2" diaginertia="{moment} {moment} {moment}"/>'
+        f'<joint axis="0 1 0"/>{geom}</body></body></worldbody></mujoco>'
+    )
+
+
+@pytest.mark.parametrize("written", [in_sdf, in_mjcf])
+def test_inertia_in_another_unit_is_hinted_at_in_every_format(written):
+    if written is in_mjcf:
+        pytest.importorskip("mujoco")
+    hints = [n for n in lw.load(written(200)).notes if "radius of gyration" in n.text]
+    assert [(n.level, n.element) for n in hints] == [("warning", "b")]
+    assert not [n for n in lw.load(written(2e-4)).notes if "radius of gyration" in n.text]
+
+
+def test_a_geom_of_its_size_explains_an_inertia():
+    """A light sheet 40 m wide beside joints half a metre apart."""
+    pytest.importorskip("mujoco")
+    sheet = '<geom type="box" size="20 20 .01" contype="0" conaffinity="0"/>'
+    assert not [n for n in lw.load(in_mjcf(26, sheet)).notes if "radius of" in n.text]

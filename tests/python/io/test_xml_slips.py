@@ -124,6 +124,8 @@ def test_text_is_read_as_xacro_returns_it(tmp_path, monkeypatch):
         ("upper", "+Infinity", float("inf")),
         ("effort", "-1", float("inf")),
         ("velocity", "INF", float("inf")),
+        ("effort", ".inf", float("inf")),
+        ("lower", "-1.#INF", -float("inf")),
         ("effort", "\u200b10", 10),
     ],
 )
