@@ -43,6 +43,16 @@ TEST(Breakpoints, OfAPulseAreItsRows) {
   EXPECT_TRUE(all(found, Kind::jump));
 }
 
+TEST(Breakpoints, OfABlowOfANanosecondAreItsRows) {
+  const std::vector<double> times{0, 5, 5 + 1e-11, 5 + 9.9e-10, 5 + 1e-9, 20};
+  const Table table = linear(times, [&](double t) { return t > 5 && t < times[4] ? 1e9 : 0; });
+  const Breakpoints found = find_breakpoints(table, {}, 1e-7);
+  EXPECT_EQ(found.times, (std::vector<double>(times.begin() + 1, times.end() - 1)));
+  // Not where it is the rounding of a much larger force.
+  const TableAction beside{.least = 1e11};
+  EXPECT_TRUE(find_breakpoints(table, beside, 1e-7).times.empty());
+}
+
 TEST(Breakpoints, EndsCountWhereTheyAreHeld) {
   const Table table = linear({1, 2}, [](double t) { return t; });
   EXPECT_EQ(find_breakpoints(table, {}, 1e-7).times, (std::vector<double>{1, 2}));
