@@ -1,5 +1,6 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -254,15 +255,19 @@ void bind_loads(nb::module_& m) {
 void bind_assembly(nb::module_& m) {
   m.def(
       "assemble",
-      [](const PyModel& self, nb::handle q, nb::handle v, const std::vector<std::string>& hold) {
+      [](const PyModel& self, nb::handle q, nb::handle v, const std::vector<std::string>& hold,
+         const std::vector<std::pair<std::string, std::vector<double>>>& loop_rates) {
         const Argument q0("q0", {size(self.model->nq())}, q), v0("v0", {size(self.model->nv())}, v);
         if (!q0.given || q0.array.ndim() != 1 || !v0.given || v0.array.ndim() != 1)
           throw InputError("q0 and v0 take the coordinates and rates of one state, shapes (" +
                            std::to_string(self.model->nq()) + ",) and (" +
                            std::to_string(self.model->nv()) + ",)");
+        std::vector<LoopRate> rates;
+        for (const auto& [joint, own] : loop_rates) rates.push_back({joint, own});
         const Assembly found =
             linkwise::assemble(*self.model, {q0.data, q0.data + self.model->nq()},
-                               {v0.data, v0.data + self.model->nv()}, hold);
+                               {v0.data, v0.data + self.model->nv()}, hold, {},
+                               rates);
         nb::dict out;
         out["q"] = to_numpy(found.q);
         out["v"] = to_numpy(found.v);
@@ -271,6 +276,7 @@ void bind_assembly(nb::module_& m) {
         return out;
       },
       "model"_a, "q0"_a, "v0"_a, "hold"_a,
+      "loop_rates"_a = std::vector<std::pair<std::string, std::vector<double>>>(),
       "The position near q0 (nq,) that closes all loops, and rates near v0 (nv,) that keep them "
       "closed: see linkwise.assemble.");
 }

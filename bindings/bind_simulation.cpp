@@ -1,5 +1,6 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -193,7 +194,8 @@ void bind_simulation(nb::module_& m) {
           },
           "model"_a, "options"_a)
       .def("start", &PySimulation::start, "t0"_a, "q0"_a, "v0"_a,
-           "hold"_a = std::vector<std::string>())
+           "hold"_a = std::vector<std::string>(),
+           "loop_rates"_a = std::vector<std::pair<std::string, std::vector<double>>>())
       .def_prop_ro(
           "assembled", [](const PySimulation& s) { return s.simulation.assembled(); },
           "What closing the loops changed at the start, one line; empty: nothing.")

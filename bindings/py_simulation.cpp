@@ -228,7 +228,9 @@ nb::object PySimulation::extremes() {
   return to_numpy(found);
 }
 
-void PySimulation::start(double t0, nb::handle q, nb::handle v, std::vector<std::string> hold) {
+void PySimulation::start(
+    double t0, nb::handle q, nb::handle v, std::vector<std::string> hold,
+    const std::vector<std::pair<std::string, std::vector<double>>>& loop_rates) {
   const Argument q0("q0", {static_cast<size_t>(model->nq())}, q),
       v0("v0", {static_cast<size_t>(model->nv())}, v);
   if (!q0.given || q0.array.ndim() != 1)
@@ -237,6 +239,7 @@ void PySimulation::start(double t0, nb::handle q, nb::handle v, std::vector<std:
     throw InputError("v0 must have shape (" + std::to_string(model->nv()) + ",)");
   Start start{q0.data, v0.data};
   start.hold = std::move(hold);
+  for (const auto& [joint, rates] : loop_rates) start.loop_rates.push_back({joint, rates});
   simulation.start(t0, start);
 }
 

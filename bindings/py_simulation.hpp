@@ -37,7 +37,8 @@ class PySimulation {
                        nb::handle breakpoints, nb::handle samples);
   void keep_extremes(nb::handle directions);
   nb::object extremes();
-  void start(double t0, nb::handle q, nb::handle v, std::vector<std::string> hold);
+  void start(double t0, nb::handle q, nb::handle v, std::vector<std::string> hold,
+             const std::vector<std::pair<std::string, std::vector<double>>>& loop_rates);
 
   /// The garbage collector's: a user's function may refer to its own simulation, by the traceback
   /// of an exception for one.

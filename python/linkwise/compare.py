@@ -112,7 +112,11 @@ def driven_trajectory(model: Model, arguments: Mapping[str, Any], states: int) -
         as_wrench(wrench).apply(simulation, body)
     q0, v0 = arguments.get("q0"), arguments.get("v0")
     loops = arguments.get("loop_position")
-    q0 = assemble(model, q0, hold=arguments.get("hold", ()), loop_position=loops).q if loops else q0
+    rates = arguments.get("loop_velocity")
+    if loops or rates:
+        given = {"loop_position": loops, "loop_velocity": rates}
+        start = assemble(model, q0, v0, hold=arguments.get("hold", ()), **given)
+        q0, v0 = start.q, start.v if rates else v0
     return _record(
         simulation,
         model,

@@ -139,7 +139,7 @@ class ArgumentBuilder:
         else:
             state = np.array(model.initial_configuration()) if position else np.zeros(model.nv)
         for joint, values in given.items():
-            if position and joint in self.loop_names:  # see loop_positions()
+            if joint in self.loop_names:  # see loop_positions(), loop_velocities()
                 continue
             keys = ("initial", key, joint)
             self._check_joint(joint, keys)
@@ -151,12 +151,17 @@ class ArgumentBuilder:
         return state
 
     def held(self) -> dict[str, Any]:
-        """Which joints the start of a run leaves where they are, and where loop joints are then."""
+        """Which joints the start of a run leaves where they are, and where loop joints are then
+        and how they move."""
         hold = [
             joint for joint in self.source.settings.initial.position if joint in self.joint_names
         ]
-        loops = self.loop_positions()
-        return ({"hold": hold} if hold else {}) | ({"loop_position": loops} if loops else {})
+        found = {
+            "hold": hold,
+            "loop_position": self.loop_positions(),
+            "loop_velocity": self.loop_velocities(),
+        }
+        return {key: value for key, value in found.items() if value}
 
     def loop_positions(self) -> dict[str, float]:
         """Where joints that close loops start [rad, m]."""
@@ -173,6 +178,17 @@ class ArgumentBuilder:
                     "give positions of joints of the tree",
                 )
             found[joint] = float(self._fit(values, units, keys, _KINDS["position"])[0])
+        return found
+
+    def loop_velocities(self) -> dict[str, list[float]]:
+        """The rates that joints which close loops start with [rad/s, m/s]."""
+        found = {}
+        for joint, values in self.source.settings.initial.velocity.items():
+            if joint not in self.loop_names:
+                continue
+            keys = ("initial", "velocity", joint)
+            units = self._units(joint, keys, positions=False)
+            found[joint] = self._fit(values, units, keys, _KINDS["velocity"]).tolist()
         return found
 
     def _keyframe(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]] | None:

@@ -49,6 +49,7 @@ def assemble(
     *,
     hold: Sequence[str] = (),
     loop_position: Mapping[str, float] | None = None,
+    loop_velocity: Mapping[str, float | Sequence[float]] | None = None,
 ) -> Assembly:
     """The position near `q0` that closes all loops, and rates near `v0` that keep them closed.
 
@@ -60,24 +61,50 @@ def assemble(
             loops do not close so, they are released, the last one first; see `released`.
         loop_position: By name where joints of one axis that close loops are to stand [rad, m], such
             as the length of a cylinder; the joints of the tree follow.
+        loop_velocity: By name the rates that joints which close loops are to have [rad/s, m/s], one
+            per degree of freedom, such as that of a cylinder. Joints of the tree follow; of those
+            held each keeps its rate that can, the first one first.
 
     Positions change as little as they can in the metric of the mass matrix, step by step, and rates
-    by the least kinetic energy.
+    by the least kinetic energy that keeps loops closed at the rates of `loop_velocity`.
 
     Raises:
         InputError: no position was found; the message says which loop stays open by how much. Or
-            the rates of held joints contradict each other.
+            the rates of held joints, or of loop joints, contradict each other.
     """
     q = state_vector("q0", q0, model.nq, model.initial_configuration())
     v = state_vector("v0", v0, model.nv, np.zeros(model.nv))
     held = held_joints(hold)
     check_mapping("loop_position", loop_position)
+    rates = loop_rates(model, loop_velocity)
     if not loop_position:
-        found = _core.assemble(model, q, v, held)
+        found = _core.assemble(model, q, v, held, rates)
         return Assembly(found["q"], found["v"], found["gap"], tuple(found["released"]))
     there = _core.assemble(_with_loops_at(model, loop_position), q, np.zeros(model.nv), held)
-    found = _core.assemble(model, there["q"], v, [j for j in held if j not in there["released"]])
+    still = [joint for joint in held if joint not in there["released"]]
+    found = _core.assemble(model, there["q"], v, still, rates)
     return Assembly(found["q"], found["v"], there["gap"], tuple(there["released"]))
+
+
+def loop_rates(
+    model: Model, loop_velocity: Mapping[str, float | Sequence[float]] | None
+) -> list[tuple[str, list[float]]]:
+    """The rates of loop joints as the core takes them: names with finite numbers."""
+    check_mapping("loop_velocity", loop_velocity)
+    found = []
+    for joint, rates in (loop_velocity or {}).items():
+        if joint not in model.loop_names:
+            raise InputError(
+                f"loop_velocity: {shown(joint)} is no joint that closes a loop; "
+                "rates of joints of the tree stand in v0"
+            )
+        numbers = np.atleast_1d(np.asarray(rates, dtype=float))
+        if numbers.ndim != 1 or not np.isfinite(numbers).all():
+            raise InputError(
+                f"loop_velocity: {shown(rates)} of {joint!r}; give finite rates [rad/s, m/s]"
+            )
+        found.append((joint, numbers.tolist()))
+    return found
 
 
 def at_loop_positions(

@@ -36,7 +36,7 @@ from linkwise.simulation.arguments import (
     sample_times,
     state_vector,
 )
-from linkwise.simulation.assembling import at_loop_positions
+from linkwise.simulation.assembling import at_loop_positions, loop_rates
 from linkwise.simulation.determinacy import Determinacy, is_looked_at, not_looked_at
 from linkwise.simulation.numerics import DEFAULTS, Numerics
 from linkwise.simulation.recording import Recording
@@ -410,6 +410,7 @@ def simulate(
     threads: int | None = None,
     hold: Sequence[str] = (),
     loop_position: Mapping[str, float] | None = None,
+    loop_velocity: Mapping[str, float | Sequence[float]] | None = None,
     record: Recording | Mapping[str, Any] | Collection[str] | None = None,
     output: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
@@ -442,6 +443,8 @@ def simulate(
             not close so, they are released, the last one first, and `run.warnings` says so.
         loop_position: By name where joints of one axis that close loops start [rad, m], such as
             the length of a cylinder; the joints of the tree follow; `run.warnings` says how far.
+        loop_velocity: By name the rates with which joints that close loops start [rad/s, m/s], one
+            per degree of freedom; those of the tree follow by the least kinetic energy.
         threads: Worker threads; the results do not depend on it.
         record: Names of the quantities to record, such as `["joint_load", "position"]`, or a
             `Recording`, which also picks joints; everything by default.
@@ -492,7 +495,7 @@ def simulate(
     notes = set_driven(simulation, model, by_joint, by_name, float(sampled[-1]), start)
     if schema.extremes:
         simulation.keep_extremes(joint_directions(model))
-    simulation.start(0.0, *start, hold=hold)
+    simulation.start(0.0, *start, hold=hold, loop_rates=loop_rates(model, loop_velocity))
     attrs = provenance(
         model,
         options={

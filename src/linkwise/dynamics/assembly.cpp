@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <iomanip>
 #include <memory>
+#include <set>
 #include <sstream>
 
 #include "linkwise/base/error.hpp"
@@ -124,29 +125,53 @@ int widest(const Model& model, const LoopStates& states, bool of_rates) {
   return worst;
 }
 
-/// Names of the joints of given motion on loop l.
+struct LoopGroup {
+  std::set<int> loops, bodies;
+};
+
+/// Loop l and those that share bodies with it, or with one of these; and all these bodies.
+LoopGroup loops_beside(const Model& model, const LoopStates& states, int l) {
+  LoopGroup out;
+  const auto take = [&](int loop) {
+    out.loops.insert(loop);
+    for (const auto* path : {&states.path(loop).to_a, &states.path(loop).to_b})
+      out.bodies.insert(path->begin(), path->end());
+  };
+  const auto shares = [&](int loop) {
+    for (const auto* path : {&states.path(loop).to_a, &states.path(loop).to_b})
+      for (const int body : *path)
+        if (out.bodies.count(body)) return true;
+    return false;
+  };
+  take(l);
+  for (size_t before = 0; before < out.loops.size();) {
+    before = out.loops.size();
+    for (int k = 0; k < model.n_loops(); ++k)
+      if (!out.loops.count(k) && shares(k)) take(k);
+  }
+  return out;
+}
+
+/// Names of the joints of given motion on loop l and on those beside it.
 std::vector<std::string> given_in_loop(const Model& model, const LoopStates& states, int l) {
   std::vector<std::string> given;
   const auto add = [&](const JointInfo& joint, const std::vector<Element>& elements) {
     if (joint.n_elements > 0 && elements[joint.first_element].prescribed)
       given.push_back("'" + joint.name + "'");
   };
-  const auto in_loop = [&](int body) {
-    for (const auto* path : {&states.path(l).to_a, &states.path(l).to_b})
-      if (std::find(path->begin(), path->end(), body) != path->end()) return true;
-    return false;
-  };
+  const auto group = loops_beside(model, states, l);
   for (const JointInfo& joint : model.joints)
-    if (in_loop(joint.body)) add(joint, model.elements);
-  add(model.loops.joints[l].joint, model.loops.elements);
+    if (group.bodies.count(joint.body)) add(joint, model.elements);
+  for (const int loop : group.loops) add(model.loops.joints[loop].joint, model.loops.elements);
   return given;
 }
 
 /// Empty: no motion is given there.
-std::string contradiction(const Model& model, const LoopStates& states, int l) {
+std::string contradiction(const Model& model, const LoopStates& states, int l,
+                          const char* what = "motion") {
   const std::vector<std::string> given = given_in_loop(model, states, l);
   if (given.empty()) return "";
-  std::string text = given.size() == 1 ? "motion of " : "motions of ";
+  std::string text = what + std::string(given.size() == 1 ? " of " : "s of ");
   for (size_t k = 0; k < given.size(); ++k)
     text += (k == 0 ? "" : k + 1 < given.size() ? ", " : " and ") + given[k];
   return text + (given.size() == 1 ? " contradicts" : " contradict each other through") +
@@ -347,22 +372,28 @@ std::unique_ptr<const Model> holding(const Model& model, const std::vector<std::
   return std::make_unique<const Model>(std::move(spec));
 }
 
-void make_consistent(const Model& model, LoopProjection& loops, const std::vector<double>& q,
-                     std::vector<double>& v) {
+/// Takes the least out of v that keeps loops closed; false: no rates nearby do.
+bool try_rates(LoopProjection& loops, const std::vector<double>& q, std::vector<double>& v) {
   double fastest = 0;
   for (const double x : v) fastest = std::max(fastest, std::abs(x));
-  double left = 0;
-  for (int k = 0; k < 3; ++k) left = loops.stop(q.data(), weakest[0], v.data());
-  left = loops.slip(q.data(), v.data());
-  if (left <= consistent * (1 + fastest)) return;
+  for (int k = 0; k < 3; ++k) loops.stop(q.data(), weakest[0], v.data());
+  return loops.slip(q.data(), v.data()) <= consistent * (1 + fastest);
+}
+
+/// Says what contradicts what, of rates that try_rates() found no remedy for.
+[[noreturn]] void refuse_rates(const Model& model, LoopProjection& loops,
+                               const std::vector<double>& q, const std::vector<double>& v,
+                               bool of_loops) {
   require_coupled(model, loops.states(), q.data(), v.data());
   const int l = widest(model, loops.states(), true);
   const LoopMiss miss = miss_of(loops.states()[l], loops.states()[l].slip);
-  const std::string given = contradiction(model, loops.states(), l),
+  const std::string given = contradiction(model, loops.states(), l, of_loops ? "rate" : "motion"),
                     by =
                         ", by " + rounded(miss.shift) + " m/s and " + rounded(miss.turn) + " rad/s";
   if (!given.empty())
-    throw InputError(given + by + "; drive one of them, or start where the machine can move");
+    throw InputError(given + by +
+                     (of_loops ? "; give fewer of them, or start where the machine can move so"
+                               : "; drive one of them, or start where the machine can move"));
   throw InputError(
       "joint '" + model.loops.joints[l].joint.name + "'" + model.where() +
       " opens: no rates near those of the start keep its loop closed" + by +
@@ -370,15 +401,99 @@ void make_consistent(const Model& model, LoopProjection& loops, const std::vecto
       "be parallel are so to all digits");
 }
 
+void make_consistent(const Model& model, LoopProjection& loops, const std::vector<double>& q,
+                     std::vector<double>& v) {
+  if (!try_rates(loops, q, v)) refuse_rates(model, loops, q, v, false);
+}
+
+/// The machine in which loop joints of these rates have a given motion, and what this is at q.
+class WithLoopRates {
+ public:
+  WithLoopRates(const Model& model, const std::vector<double>& q, const std::vector<double>& v,
+                const LoopMotion& given, const std::vector<LoopRate>& rates)
+      : spec_(model.spec()) {
+    LoopStates states(model);
+    SweepInput<double> in;
+    in.q = q.data();
+    in.v = v.data();
+    in.loop_q = given.q;
+    in.loop_v = given.v;
+    states.update(in);
+    q_ = states.q();
+    v_ = states.v();
+    if (!given.q)  // those of given motion follow the tree
+      std::erase_if(spec_.prescribed, [&](const std::string& name) {
+        const auto& joints = model.loops.joints;
+        return std::any_of(joints.begin(), joints.end(),
+                           [&](const LoopJoint& loop) { return loop.joint.name == name; });
+      });
+    for (const LoopRate& rate : rates) give(model, rate);
+  }
+
+  /// From v [nv], the rates that are nearest; false: there are none. Joints of `hold` keep theirs.
+  bool find(const std::vector<double>& q, const std::vector<std::string>& hold,
+            std::vector<double>& v, bool must = false) const {
+    ModelSpec spec = spec_;
+    for (const std::string& name : hold)
+      if (std::find(spec.prescribed.begin(), spec.prescribed.end(), name) == spec.prescribed.end())
+        spec.prescribed.push_back(name);
+    const Model model(std::move(spec));
+    LoopProjection loops(model, count_loop_work(model).prefers_graph());
+    loops.give({q_.data(), v_.data()});
+    loops.gap(q.data());
+    std::vector<double> found = v;
+    const bool done = try_rates(loops, q, found);
+    if (!done && must) refuse_rates(model, loops, q, found, true);
+    if (done) v = std::move(found);
+    return done;
+  }
+
+ private:
+  void give(const Model& model, const LoopRate& rate) {
+    const auto& joints = model.loops.joints;
+    const auto at = std::find_if(joints.begin(), joints.end(), [&](const LoopJoint& loop) {
+      return loop.joint.name == rate.joint;
+    });
+    const std::string who = "loop_velocity: '" + rate.joint + "'" + model.where();
+    if (at == joints.end() || at->kind != LoopKind::joint)
+      throw InputError(who + " is no joint that closes a loop; rates of joints of the tree stand in v0");
+    if (rate.v.size() != static_cast<size_t>(at->joint.nv))
+      throw InputError(who + " has " + std::to_string(at->joint.nv) + " rates; " +
+                       std::to_string(rate.v.size()) + " are given");
+    if (std::find(spec_.prescribed.begin(), spec_.prescribed.end(), rate.joint) !=
+        spec_.prescribed.end())
+      throw InputError(who + " has a given motion, which says its rate; give one of them");
+    spec_.prescribed.push_back(rate.joint);
+    std::copy(rate.v.begin(), rate.v.end(), v_.begin() + at->joint.v);
+  }
+
+  ModelSpec spec_;
+  std::vector<double> q_, v_;
+};
+
+/// Of those held each keeps its rates that can, the first one first.
+void keep_loop_rates(const WithLoopRates& machine, const std::vector<double>& q,
+                     const std::vector<std::string>& hold, std::vector<double>& v) {
+  if (!hold.empty() && machine.find(q, hold, v)) return;
+  std::vector<std::string> kept;
+  for (size_t k = 0; k < hold.size() && hold.size() > 1; ++k) {
+    kept.push_back(hold[k]);
+    std::vector<double> tried = v;
+    if (!machine.find(q, kept, tried)) kept.pop_back();
+  }
+  machine.find(q, kept, v, true);
+}
+
 }  // namespace
 
 Assembly assemble(const Model& model, std::vector<double> q, std::vector<double> v,
-                  const std::vector<std::string>& hold, const LoopMotion& given) {
+                  const std::vector<std::string>& hold, const LoopMotion& given,
+                  const std::vector<LoopRate>& rates) {
   for (const std::string& name : hold) model.joint_index(name);
   Assembly out;
   out.q = q;
   out.v = v.empty() ? std::vector<double>(model.nv()) : std::move(v);
-  if (model.n_loops() + model.n_couplings() == 0) return out;
+  if (rates.empty() && model.n_loops() + model.n_couplings() == 0) return out;
   for (size_t n = hold.size();; --n) {
     const std::unique_ptr<const Model> held = n > 0 ? holding(model, hold, n) : nullptr;
     const Model& own = held ? *held : model;
@@ -390,14 +505,19 @@ Assembly assemble(const Model& model, std::vector<double> q, std::vector<double>
     if (!done && n > 0) continue;
     closing.loops().gap(out.q.data());
     if (!done) refuse_position(own, closing.loops().states(), given, out.q);
-    make_consistent(own, closing.loops(), out.q, out.v);
+    if (rates.empty())
+      make_consistent(own, closing.loops(), out.q, out.v);
+    else
+      keep_loop_rates({model, out.q, out.v, given, rates}, out.q,
+                      {hold.begin(), hold.begin() + static_cast<std::ptrdiff_t>(n)}, out.v);
     out.released.assign(hold.begin() + static_cast<std::ptrdiff_t>(n), hold.end());
     out.moved = changes(model, q, out.q);
     return out;
   }
 }
 
-std::string changed_rates(const Model& model, const double* asked, const double* got) {
+std::string changed_rates(const Model& model, const double* asked, const double* got,
+                          bool moving) {
   double fastest = 0;
   for (int i = 0; i < model.nv(); ++i) fastest = std::max(fastest, std::abs(asked[i]));
   std::string text;
@@ -409,7 +529,7 @@ std::string changed_rates(const Model& model, const double* asked, const double*
         largest = change;
         most = i;
       }
-    if (!(largest > consistent * (1 + fastest))) continue;
+    if (!(largest > consistent * (1 + fastest)) || (moving && asked[most] == 0)) continue;
     text += (text.empty() ? "'" : ", '") + joint.name + "' is " + rounded(got[most]) +
             " instead of " + rounded(asked[most]);
   }

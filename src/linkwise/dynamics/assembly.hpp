@@ -8,6 +8,12 @@
 
 namespace linkwise {
 
+/// The rates that a joint which closes loops is to have, one per degree of freedom.
+struct LoopRate {
+  std::string joint;
+  std::vector<double> v;
+};
+
 struct Assembly {
   std::vector<double> q, v;
   double gap = 0;                     ///< what was open before: see LoopProjection::gap
@@ -20,13 +26,16 @@ struct Assembly {
 /// given motion and those in `hold` stay where they are, those that close loops where `given` says;
 /// where loops do not close so, those of `hold` are released, the last one first. InputError where
 /// no position is found, with the loop and what is left open, and where rates that are given
-/// contradict each other.
+/// contradict each other. `rates` are conditions on those of the tree. With them a joint of `hold`
+/// keeps its own where they and the joints held before it allow that.
 Assembly assemble(const Model& model, std::vector<double> q, std::vector<double> v,
-                  const std::vector<std::string>& hold, const LoopMotion& given = {});
+                  const std::vector<std::string>& hold, const LoopMotion& given = {},
+                  const std::vector<LoopRate>& rates = {});
 
 /// "'a' is 1.64 instead of 1, ...", of every joint whose rates got changed by more than rounding;
-/// of its degrees of freedom the one that changed most.
-std::string changed_rates(const Model& model, const double* asked, const double* got);
+/// of its degrees of freedom the one that changed most. `moving`: of joints asked to move alone.
+std::string changed_rates(const Model& model, const double* asked, const double* got,
+                          bool moving = false);
 
 /// InputError naming the loop where q and v leave one open.
 void require_assembled(const Model& model, const std::vector<double>& q,

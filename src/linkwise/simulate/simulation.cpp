@@ -41,8 +41,8 @@ void Simulation::start(double t0, const Start& start) {
   impose(t0, y_.data());
   for (size_t i = 0; i < members_; ++i) check_quaternions(m, y_.data() + i * nq());
   const std::vector<double> asked = y_;
-  close_loops(t0, start.hold);
-  if (loops_) check_start(t0, rates_in(asked.data()));
+  close_loops(t0, start);
+  if (loops_) check_start(t0, rates_in(asked.data()), !start.loop_rates.empty());
   if (LoopForces* loops = forces_->loops()) {
     loops->accepted(t0, y_.data(), rates_in(y_.data()));
     loops->require_directions();
@@ -80,11 +80,11 @@ void Simulation::start(double t0, const Start& start) {
   watch_->start(t0, y.data());
 }
 
-/// Tells what closing loops did to the rates that were asked for. Refuses a start at rest where
-/// forces of loops have no bound.
-void Simulation::check_start(double t0, const double* asked) {
+/// Tells what closing loops did to the rates that were asked for, `moving`: to those of joints that
+/// are to move. Refuses a start at rest where forces of loops have no bound.
+void Simulation::check_start(double t0, const double* asked, bool moving) {
   const double* got = rates_in(y_.data());
-  if (const std::string changed = changed_rates(model(), asked, got); !changed.empty())
+  if (const std::string changed = changed_rates(model(), asked, got, moving); !changed.empty())
     assembled_ += (assembled_.empty() ? "" : "; ") +
                   ("rates that keep loops closed are not those asked for: " + changed);
   const bool rests = std::all_of(got, got + nv(), [](double rate) { return rate == 0; });

@@ -41,6 +41,8 @@ struct Start {
   size_t members = 1;
   /// Joints that closing loops leaves where they are, as long as it can: see assemble().
   std::vector<std::string> hold = {};
+  /// Rates of joints that close loops, which those of the tree follow.
+  std::vector<LoopRate> loop_rates = {};
 };
 
 class BodyVelocityState;
@@ -137,8 +139,8 @@ class Simulation : private OdeSystem {
   void make_methods(double t0);
   void watch_forces();
   void evaluate_accepted(double t, double* y, double* ydot);
-  void close_loops(double t0, const std::vector<std::string>& hold);
-  void check_start(double t0, const double* asked);
+  void close_loops(double t0, const Start& start);
+  void check_start(double t0, const double* asked, bool moving);
   void begin_coasting();
   bool follows_error_test() const;
   SweepInput<double> input(double t, const double* q, const double* v);

@@ -12,11 +12,11 @@
 
 namespace linkwise {
 
-void Simulation::close_loops(double t0, const std::vector<std::string>& hold) {
+void Simulation::close_loops(double t0, const Start& start) {
   loops_.reset();
   assembled_.clear();
   const Model& m = setup_->driven();
-  if (m.n_loops() + m.n_couplings() == 0) return;
+  if (m.n_loops() + m.n_couplings() == 0 && start.loop_rates.empty()) return;
   loops_ = std::make_unique<LoopProjection>(
       m, setup_->choice.method == "constraint_force" && count_loop_work(m).prefers_graph());
   normalise_quaternions(m, y_.data());
@@ -30,10 +30,13 @@ void Simulation::close_loops(double t0, const std::vector<std::string>& hold) {
   const std::vector<double> q(y_.begin(), y_.begin() + position_size()),
       v(y_.begin() + position_size(), y_.end());
   if (setup_->options.exact_start) {
+    if (!start.loop_rates.empty())
+      throw InputError(
+          "loop_velocity: assemble='exact' takes all rates from v0; leave one of both out");
     require_assembled(m, q, v, given);
     return begin_coasting();
   }
-  const Assembly found = assemble(m, q, v, hold, given);
+  const Assembly found = assemble(m, q, v, start.hold, given, start.loop_rates);
   std::copy(found.q.begin(), found.q.end(), y_.begin());
   std::copy(found.v.begin(), found.v.end(), rates_in(y_.data()));
   begin_coasting();
