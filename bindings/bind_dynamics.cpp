@@ -266,8 +266,7 @@ void bind_assembly(nb::module_& m) {
         for (const auto& [joint, own] : loop_rates) rates.push_back({joint, own});
         const Assembly found =
             linkwise::assemble(*self.model, {q0.data, q0.data + self.model->nq()},
-                               {v0.data, v0.data + self.model->nv()}, hold, {},
-                               rates);
+                               {v0.data, v0.data + self.model->nv()}, hold, {}, rates);
         nb::dict out;
         out["q"] = to_numpy(found.q);
         out["v"] = to_numpy(found.v);

@@ -4,6 +4,7 @@
 #include <nanobind/nanobind.h>
 
 #include "bind.hpp"
+#include "linkwise/dynamics/bearing_shares.hpp"
 #include "linkwise/dynamics/loop_rates.hpp"
 #include "report.hpp"
 #include "states.hpp"
@@ -48,9 +49,48 @@ Raises:
     NumericsError: a result is not finite.)");
 }
 
+void bind_preload_forces(nb::module_& m) {
+  m.def(
+      "preload_forces",
+      [](const PyModel& self, nb::handle q) {
+        const Model& model = *self.model;
+        const States s(model, q, nb::none(), nb::none(), "tau", nb::none());
+        NewArray out(s.lead, {size(model.n_loads()), 3});
+        without_gil([&](const GoOn& go_on) {
+          LoopStates loops(model);
+          double* force = out.data;
+          for (size_t i = 0; i < s.count && go_on(); ++i) {
+            SweepInput<double> in;
+            in.q = s.q.data + i * size(model.nq());
+            loops.update(in);
+            for (const Vec3<double>& f : preload_forces(model, in.q, loops)) {
+              *force++ = f.x;
+              *force++ = f.y;
+              *force++ = f.z;
+            }
+          }
+        });
+        return out.array;
+      },
+      "model"_a, "q"_a,
+      R"(Forces that the preloads of bearings put on the child link, in the axes of the joint's load.
+
+Args:
+    model: the machine.
+    q: coordinates (..., nq) [rad, m].
+
+Returns:
+    (..., n_joints + n_loops, 3) [N], zero for joints without a preload: of a rod along itself, of
+    others the preload as given, turned with the child.
+
+Raises:
+    InputError: q has another shape.)");
+}
+
 }  // namespace
 
 void bind_loop_gaps(nb::module_& m) {
+  bind_preload_forces(m);
   m.def(
       "loop_gaps",
       [](const PyModel& self, nb::handle q) {

@@ -9,6 +9,7 @@ import pytest
 from test_bearings import URDF, G, door, loads, on_springs, shaft
 
 import linkwise as lw
+from linkwise import _core
 
 pytestmark = pytest.mark.filterwarnings("ignore::linkwise.ModelWarning")
 UP = {"axis": (0, 0, 1)}
@@ -117,6 +118,74 @@ def test_a_run_in_which_a_preload_is_overcome_says_so() -> None:
         run = lw.simulate(pair(3e8, 1e8, 500.0), duration=0.01, wrenches=wrench)
         said = [w["element"] for w in run.warnings if "turns against its preload" in w["text"]]
         assert said == (["left"] if force > 0 else ["right"]) * lifted
+
+
+def plates(kind: str, preload: tuple[float, float, float], **more: object) -> lw.Model:
+    """A plate between two joints, pressed against each other along y, both as stiff: of a kind, or
+    a ball joint and a fixed one."""
+    builder = lw.ModelBuilder("plates", gravity=(0, 0, 0))
+    builder.add_link("base")
+    builder.add_link("plate", mass=30, com=(0, 0, 0), inertia=np.diag([1.0, 4.0, 4.0]))
+    first = "spherical" if kind == "fixed" else kind
+    builder.add_joint("one", first, "base", "plate", **more)
+    builder.add_loop("other", kind, "base", "plate", **more)
+    stiff = {"axial": 1e8, "radial": 1e8}
+    model = builder.build().with_bearing("one", **stiff, preload=preload)
+    return model.with_bearing("other", **stiff, preload=tuple(-x for x in preload))
+
+
+@pytest.mark.parametrize(
+    ("kind", "more", "what"),
+    [
+        ("spherical", {}, "the force turns"),
+        ("fixed", {}, "the force turns"),
+        ("revolute", {"axis": (0, 0, 1)}, "the force across its axis turns"),
+    ],
+)
+def test_any_joint_whose_preload_is_overcome_says_so(kind, more, what) -> None:
+    """Each of two equal bearings takes half of a push: 500 N are overcome by more than 1000 N."""
+    model = plates(kind, (0, 500.0, 0), **more)
+    assert misfit_loads(model)["one"][1] == pytest.approx(500, rel=1e-9)
+    for force, who in ((900.0, []), (1100.0, ["one"]), (-900.0, []), (-1100.0, ["other"])):
+        wrench = {"plate": lw.Wrench([0, force, 0, 0, 0, 0], axes="world")}
+        run = lw.simulate(model, duration=0.01, wrenches=wrench)
+        said = {w["element"]: w["text"] for w in run.warnings if "its preload in" in w["text"]}
+        assert list(said) == who
+        assert all(text.startswith(what) for text in said.values())
+
+
+def test_a_preload_is_turned_with_the_joint() -> None:
+    """The hinge's preload stands along the parent's y; the plate is turned by a right angle, so a
+    push along the world's y is one along its own -x or x."""
+    model = plates("revolute", (0, 500.0, 0), axis=(0, 0, 1))
+    found = _core.preload_forces(model, [[0.0], [np.pi / 2]])
+    np.testing.assert_allclose(found[0], [[0, 500, 0], [0, -500, 0]], atol=1e-10)
+    np.testing.assert_allclose(found[1], [[500, 0, 0], [-500, 0, 0]], atol=1e-10)
+    for force, who in ((900.0, []), (1100.0, ["one"]), (-1100.0, ["other"])):
+        wrench = {"plate": lw.Wrench([0, force, 0, 0, 0, 0], axes="world")}
+        run = lw.simulate(model, duration=0.01, wrenches=wrench, q0=[np.pi / 2])
+        said = [w["element"] for w in run.warnings if "its preload in" in w["text"]]
+        assert said == who
+
+
+def test_it_turns_during_a_run() -> None:
+    """A push that grows: the first sample past 1000 N is named."""
+    model = plates("spherical", (0, 500.0, 0))
+    wrench = {"plate": lw.Wrench(lambda t: [0, 19000 * t, 0, 0, 0, 0], axes="world")}
+    run = lw.simulate(model, duration=0.1, every=0.01, wrenches=wrench)
+    (text,) = [w["text"] for w in run.warnings if "its preload in" in w["text"]]
+    assert "first at 0.06 s" in text
+    light = lw.simulate(model, duration=0.1, every=0.01, wrenches=wrench, record=["joint_load"])
+    assert any(w["text"] == text for w in light.warnings)
+
+
+def test_a_preloaded_tie_rod_that_goes_slack_says_so() -> None:
+    """Both rods pull by 300 N. The lower one, twice as stiff, loses two thirds of a weight."""
+    model = braced(preload=-300.0).with_bearing("above", axial=1e6, preload=-300.0)
+    for weight, slack in ((440.0, []), (460.0, ["below"])):
+        wrench = {"slider": lw.Wrench([0, 0, G - weight, 0, 0, 0])}
+        run = lw.simulate(model, duration=0.01, wrenches=wrench)
+        assert [w["element"] for w in run.warnings if "its preload in" in w["text"]] == slack
 
 
 def braced(**given: float) -> lw.Model:

@@ -170,6 +170,7 @@ def _add_determinate(
     models: Sequence[Model],
     rows: Mapping[str, Array],
     drives: Mapping[str, Drive],
+    times: Array,
 ) -> list[Ignored]:
     """Add which loads of each member rigid bodies determine; what is said of those that they do
     not. columns: positions (members, time, nq), and the states at peaks where they are kept."""
@@ -178,12 +179,13 @@ def _add_determinate(
     known: dict[str, list[AnyArray]] = {mark.name: [] for mark in schema.marks}
     said: dict[Ignored, list[int]] = {}
     positions, states = columns["position"], columns.get("extreme_state")
+    loads = columns.get("joint_load")
     each = len(positions) // len(models)
     for member, path in enumerate(positions):
         model = models[member // each]
         start = _core.assemble(model, rows["q0"][member], rows["v0"][member], [])["q"]
         seen = Determinacy(model, drives, start, len(path), explain=False)
-        seen.see(path)
+        seen.see(path, None if loads is None else loads[member], times)
         seen.see_peaks(None if states is None else states[member])
         marks = seen.marks()
         for name, of_members in known.items():
@@ -299,7 +301,7 @@ def simulate_batch(
     )
     if schema.extremes:
         columns |= schema.extremes.split(flat)
-    notes += _add_determinate(columns, schema, models, rows, by_joint)
+    notes += _add_determinate(columns, schema, models, rows, by_joint, sampled)
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
     if not interrupted:
         ignored = [*ignored, *_of_loops(models, rows, said, schema)]

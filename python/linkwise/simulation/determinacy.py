@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from linkwise import _core
 from linkwise._core import InputError
 from linkwise.base import COMPONENTS, DERIVED, AnyArray
 from linkwise.drives import Locked, Motion
@@ -22,10 +23,16 @@ if TYPE_CHECKING:
     from linkwise.drives import Drive
 
 _MOST_NAMED = 8
+_ROUNDING = 1e-12
 _LIFTED = (
     "the force along its axis turns against its preload in this run: a bearing that carries one "
     "way alone would let go there, and here it pulls; give more preload, or bearings that carry "
     "both ways"
+)
+_TURNED = (
+    "the force{} turns against its preload in samples of this run, first at {:.4g} s: what "
+    "carries one way alone would let go there, and here it pulls; give more preload, or bearings "
+    "that carry both ways"
 )
 _REMEDY = (
     ", but say how stiff its bearings are ([bearing.JOINT], with_bearing), or leave a joint of the "
@@ -73,10 +80,17 @@ class Determinacy:
         self._couplings: set[str] = set()
         self._told: list[Undecided] = []
         self._misfits: list[tuple[str, str]] = []
+        self._turned: dict[str, tuple[str, float]] = {}
+        self.preloaded = any("preload" in bearing for bearing in model.bearings.values())
         self._classify(q)
         if self._count and explain and small:
             self._told = describe(model, q, given) if self._self_stresses else []
             self._misfits = misfit_notes(model, q)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The quantities of samples that `see` takes."""
+        return ("position", "joint_load") if self.preloaded else ("position",)
 
     @property
     def throughout(self) -> AnyArray:
@@ -108,12 +122,39 @@ class Determinacy:
         self._open += np.logical_not(found.determinate)
         self._self_stresses = max(self._self_stresses, len(found.undecided))
 
-    def see(self, positions: AnyArray) -> None:
-        """The next samples (time, nq); a few of all are looked at."""
+    def see(
+        self, positions: AnyArray, loads: AnyArray | None = None, times: AnyArray | None = None
+    ) -> None:
+        """The next samples (time, nq), of which a few are looked at; with loads (time, n_joints +
+        n_loops, 6) at `times` [s] all of them, whether a force turns against its preload."""
+        if loads is not None and times is not None and self.preloaded:
+            self._see_preloads(positions, loads, times)
         for k in range(self._seen, self._seen + len(positions)):
             if k in self._wanted:
                 self._classify(positions[k - self._seen])
         self._seen += len(positions)
+
+    def _see_preloads(self, positions: AnyArray, loads: AnyArray, times: AnyArray) -> None:
+        """Of joints with an axis the part across it; `see_extremes` has that along it."""
+        there = np.isfinite(positions).all(axis=1)  # of members of a batch until they end
+        positions, loads, times = positions[there], loads[there], times[there]
+        preloads = _core.preload_forces(self._model, positions)
+        names = [*self._model.joint_names, *self._model.loop_names]
+        axes = [*self._model.joint_axes, *self._model.loop_axes]
+        for name, bearing in self._model.bearings.items():
+            j = names.index(name)
+            if "preload" not in bearing or name in self._turned:
+                continue
+            given, part = preloads[:, j], ""
+            if axes[j]:
+                axis = np.asarray(axes[j][0][1], dtype=float)
+                size = np.abs(given).max(initial=0.0)
+                given, part = given - np.outer(given @ axis, axis), " across its axis"
+                if np.abs(given).max(initial=0.0) <= _ROUNDING * size:
+                    continue
+            against = np.einsum("ti,ti->t", loads[:, j, :3], given) < 0
+            if against.any():
+                self._turned[name] = part, float(times[np.argmax(against)])
 
     def see_peaks(self, states: AnyArray | None) -> None:
         """The states at the peaks of the loads, (..., state), whose first numbers are positions."""
@@ -155,6 +196,8 @@ class Determinacy:
         if self._couplings:
             parts.append(f"what couplings {_and(sorted(map(repr, self._couplings)))} carry")
         notes = [Ignored("", name, text) for name, text in self._misfits]
+        turned = self._turned.items()
+        notes += [Ignored("", name, _TURNED.format(*found)) for name, found in turned]
         if not parts or not self._count:
             return notes
         count = self._self_stresses

@@ -237,8 +237,8 @@ def _record(
     """
     started = clock.monotonic()
     try:
-        see = None if determinacy is None else determinacy.see
-        ending = run_time_loop(simulation, record, schema, times, progress, see)
+        looking = () if determinacy is None else (_see_chunk(determinacy), determinacy.needs)
+        ending = run_time_loop(simulation, record, schema, times, progress, *looking)
     except BaseException as error:
         # A function of the caller's (a drive, the progress) raised an exception, or the disk is
         # full.
@@ -256,6 +256,10 @@ def _record(
     noticed += [] if doubt is None else [doubt]
     finished = record.finish(attrs | warning_attrs(noticed), found)
     return Run(finished, record.path, model), ending
+
+
+def _see_chunk(determinacy: Determinacy) -> Callable[[Mapping[str, Array]], object]:
+    return lambda chunk: determinacy.see(chunk["position"], chunk.get("joint_load"), chunk["time"])
 
 
 def _noticed(simulation: Simulation, ignored: Sequence[Ignored]) -> list[Ignored]:
@@ -441,10 +445,8 @@ def simulate(
             dictionary. `linkwise.numerics()` lists all with their defaults.
         hold: Joints that closing the loops of the start leaves where `q0` has them; where loops do
             not close so, they are released, the last one first, and `run.warnings` says so.
-        loop_position: By name where joints of one axis that close loops start [rad, m], such as
-            the length of a cylinder; the joints of the tree follow; `run.warnings` says how far.
-        loop_velocity: By name the rates with which joints that close loops start [rad/s, m/s], one
-            per degree of freedom; those of the tree follow by the least kinetic energy.
+        loop_position: By name where joints of one axis that close loops start: see `assemble`.
+        loop_velocity: The same of the rates of such joints, also of several axes.
         threads: Worker threads; the results do not depend on it.
         record: Names of the quantities to record, such as `["joint_load", "position"]`, or a
             `Recording`, which also picks joints; everything by default.

@@ -6,7 +6,7 @@ import contextlib
 import signal
 import threading
 import time as clock
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -129,13 +129,12 @@ def run_time_loop(
     schema: Schema,
     times: Array,
     progress: Callable[[Progress], object] | None = None,
-    see: Callable[[Array], object] | None = None,
+    see: Callable[[Mapping[str, Array]], object] | None = None,
+    seen: Collection[str] = (),
 ) -> Ending:
-    """Advance through the sample times, handing each chunk of samples to the recorder, and its
-    positions to `see`."""
-    quantities = schema.quantities
-    if see is not None:
-        quantities = tuple(dict.fromkeys((*quantities, "position")))
+    """Advance through the sample times, handing each chunk of samples to the recorder, and to `see`
+    together with the quantities `seen`."""
+    quantities = tuple(dict.fromkeys((*schema.quantities, *seen)))
     pace = _Pace(most=max(1, CALL_BYTES // schema.row_bytes))
     end = float(times[-1])
     started = clock.monotonic()
@@ -150,7 +149,7 @@ def run_time_loop(
                 if are_samples:
                     recorder.append(chunk)
                     if see is not None:
-                        see(chunk["position"])
+                        see(chunk)
                     recorded += len(chunk["time"])
                 if len(chunk["time"]):
                     reached = float(chunk["time"][-1])

@@ -456,7 +456,8 @@ class WithLoopRates {
     });
     const std::string who = "loop_velocity: '" + rate.joint + "'" + model.where();
     if (at == joints.end() || at->kind != LoopKind::joint)
-      throw InputError(who + " is no joint that closes a loop; rates of joints of the tree stand in v0");
+      throw InputError(who +
+                       " is no joint that closes a loop; rates of joints of the tree stand in v0");
     if (rate.v.size() != static_cast<size_t>(at->joint.nv))
       throw InputError(who + " has " + std::to_string(at->joint.nv) + " rates; " +
                        std::to_string(rate.v.size()) + " are given");
@@ -516,8 +517,7 @@ Assembly assemble(const Model& model, std::vector<double> q, std::vector<double>
   }
 }
 
-std::string changed_rates(const Model& model, const double* asked, const double* got,
-                          bool moving) {
+std::string changed_rates(const Model& model, const double* asked, const double* got, bool moving) {
   double fastest = 0;
   for (int i = 0; i < model.nv(); ++i) fastest = std::max(fastest, std::abs(asked[i]));
   std::string text;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace linkwise {
 namespace {
@@ -41,18 +42,50 @@ Mat3<double> axes_at(const Model& model, int load, const double* q, const double
   return joint.to_user.R * R;
 }
 
-}  // namespace
-
-BearingShares::BearingShares(const Model& model, std::vector<int> bearings)
-    : model_(model), bearings_(std::move(bearings)), misfit_(bearings_.size()) {
+/// Of each load: its joint's axes as drawn -> parent's.
+std::vector<Mat3<double>> axes_as_drawn(const Model& model) {
   const std::vector<double> q = model.neutral_configuration();
   std::vector<double> loop_q(model.loops.nq);
   for (const Element& e : model.loops.elements)
     if (const int own = info_of(e.kind).quaternion; own >= 0) loop_q[e.q + own + 3] = 1;
+  std::vector<Mat3<double>> out;
+  for (int load = 0; load < model.n_loads(); ++load)
+    out.push_back(transpose(axes_at(model, load, q.data(), loop_q.data())));
+  return out;
+}
+
+/// Along a rod from its parent's point to its child's, in the axes of its load; null for other
+/// joints.
+std::optional<Vec3<double>> along_rod(const Model& model, int load, const LoopStates& loops) {
+  const int l = load - model.n_joints();
+  if (l < 0 || model.loops.joints[l].kind != LoopKind::rod) return std::nullopt;
+  const Vector6<double>& n = loops[l].row[0];
+  return model.loops.joints[l].joint.to_user.R * Vec3<double>{n[0], n[1], n[2]};
+}
+
+}  // namespace
+
+BearingShares::BearingShares(const Model& model, std::vector<int> bearings)
+    : model_(model), bearings_(std::move(bearings)), misfit_(bearings_.size()) {
+  const std::vector<Mat3<double>> unturned = axes_as_drawn(model);
   for (const int b : bearings_) {
     has_misfits_ |= model.bearings[b].has_misfit;
-    unturned_.push_back(transpose(axes_at(model, model.bearings[b].load, q.data(), loop_q.data())));
+    unturned_.push_back(unturned[model.bearings[b].load]);
   }
+}
+
+std::vector<Vec3<double>> preload_forces(const Model& model, const double* q,
+                                         const LoopStates& loops) {
+  const std::vector<Mat3<double>> unturned = axes_as_drawn(model);
+  std::vector<Vec3<double>> out(model.n_loads());
+  for (const Bearing& bearing : model.bearings) {
+    const int load = bearing.load;
+    if (const auto along = along_rod(model, load, loops))
+      out[load] = bearing.preload.z * *along;
+    else
+      out[load] = axes_at(model, load, q, loops.q().data()) * unturned[load] * bearing.preload;
+  }
+  return out;
 }
 
 void BearingShares::place_misfits(const double* q, const LoopStates& loops) {
@@ -61,13 +94,9 @@ void BearingShares::place_misfits(const double* q, const LoopStates& loops) {
     Mat3<double> R = axes_at(model_, bearing.load, q, loops.q().data()) * unturned_[b];
     Vec3<double> offset = R * bearing.offset, turn = R * bearing.turn,
                  preload = R * bearing.preload;
-    const int l = bearing.load - model_.n_joints();
-    if (l >= 0 && model_.loops.joints[l].kind == LoopKind::rod) {
-      const Vector6<double>& n = loops[l].row[0];
-      const Vec3<double> along =
-          model_.loops.joints[l].joint.to_user.R * Vec3<double>{n[0], n[1], n[2]};
-      offset = bearing.offset.z * along;
-      preload = bearing.preload.z * along;
+    if (const auto along = along_rod(model_, bearing.load, loops)) {
+      offset = bearing.offset.z * *along;
+      preload = bearing.preload.z * *along;
     }
     offset += weighted(bearing.axis, bearing.across, bearing.along, preload);
     misfit_[b] = {offset.x, offset.y, offset.z, turn.x, turn.y, turn.z};

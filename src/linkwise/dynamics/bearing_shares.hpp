@@ -48,4 +48,9 @@ class BearingShares {
   std::vector<double> decided_, rows_, turned_, b_, x_, gap_, turned_gap_;
 };
 
+/// Forces [n_loads][3] that the preloads of bearings put on the child where nothing else acts, in
+/// the axes of their loads at q; zeros without one. loops: at q.
+std::vector<Vec3<double>> preload_forces(const Model& model, const double* q,
+                                         const LoopStates& loops);
+
 }  // namespace linkwise
