@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import base64
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from linkwise._core import InputError
-from linkwise.base import HALVES, Array, lengths
+from linkwise.base import HALVES, AnyArray, Array, lengths
 from linkwise.loads.causes import Split, along_total
-from linkwise.loads.determinate import components_of
+from linkwise.loads.determinate import components_of, signal_of
 from linkwise.loads.energy import energy_balance
 from linkwise.loads.engineering import derive, joint_directions
 from linkwise.loads.extremes import component_extremes, loads_at_peaks
@@ -73,12 +73,17 @@ def _dots(color: str, x: Array, y: Array) -> Figure:
     return _line("extreme", packed(x), y, **more)
 
 
+def _components(run: RunLike, joint: int) -> AnyArray:
+    """(6,) [bool] which components of this of the recorded joints are determinate."""
+    known = components_of(run)
+    return np.ones(6, dtype=np.bool_) if known is None else known[joint]
+
+
 def _histories(load: Array, run: RunLike, joint: int) -> list[Figure]:
     made = []
     extremes = component_extremes(run, joint)
     peak_times, peaks = loads_at_peaks(run, joint)
-    known = components_of(run)
-    open_ones = np.zeros(6, dtype=np.bool_) if known is None else ~known[joint]
+    open_ones = ~_components(run, joint)
     for k, (half, unit, components) in enumerate(HALVES):
         part = load[:, 3 * k : 3 * k + 3]
         data = []
@@ -97,10 +102,21 @@ def _histories(load: Array, run: RunLike, joint: int) -> list[Figure]:
     return made
 
 
-def _areas(shares: Array, causes: list[str]) -> list[Figure]:
-    """Stacked areas: what adds to the size above zero, what relieves below."""
+def _shown(name: str, sure: bool) -> str:
+    return name if sure else f"({name})"
+
+
+def _dotted(sure: bool) -> dict[str, str]:
+    return {} if sure else _OPEN
+
+
+def _areas(shares: Array, causes: list[str], known: AnyArray) -> list[Figure]:
+    """Stacked areas: what adds to the size above zero, what relieves below. known: (6,) [bool]
+    which components are determinate; shares lie along the total, which is open as one of these is.
+    """
     made = []
     for k, (half, unit, _) in enumerate(HALVES):
+        sure = bool(known[3 * k : 3 * k + 3].all())
         parts, total = along_total(shares[..., 3 * k : 3 * k + 3])
         data = []
         for sign, group in ((1.0, "up"), (-1.0, "down")):
@@ -112,9 +128,11 @@ def _areas(shares: Array, causes: list[str]) -> list[Figure]:
                     "legendgroup": cause,
                     "showlegend": sign > 0,
                 }
-                data.append(_line(cause, TIMES, values, **style))
-        data.append(_line("total", TIMES, total, line={"color": "black"}))
-        layout = _layout(f"{half.capitalize()} by cause", "time [s]", f"{half} [{unit}]")
+                data.append(_line(_shown(cause, sure), TIMES, values, **style))
+        line = {"color": "black", **_dotted(sure)}
+        data.append(_line(_shown("total", sure), TIMES, total, line=line))
+        title = f"{half.capitalize()} by cause" + ("" if sure else _NOT_KNOWN)
+        layout = _layout(title, "time [s]", f"{half} [{unit}]")
         made.append({"data": data, "layout": layout})
     return made
 
@@ -127,7 +145,7 @@ def _across(direction: Array) -> Array:
     return np.stack([first, np.cross(direction, first)])
 
 
-def _polar(load: Array, direction: Array) -> Figure:
+def _polar(load: Array, direction: Array, known: Mapping[str, bool]) -> Figure:
     """The radial force's size and direction, as the outboard body feels it."""
     if np.isnan(direction).any():
         raise InputError("no axis")
@@ -137,10 +155,12 @@ def _polar(load: Array, direction: Array) -> Figure:
         "mode": "lines",
         "r": packed(np.hypot(x, y)),
         "theta": packed(np.degrees(np.arctan2(y, x))),
-        "line": {"width": 1.2},
+        "line": {"width": 1.2, **_dotted(known["radial"])},
     }
     polar = {"radialaxis": {"title": {"text": "N"}}}
-    title = {"text": "Radial force about the axis, in the joint frame", "font": {"size": 14}}
+    text = "Radial force about the axis, in the joint frame"
+    text += "" if known["radial"] else _NOT_KNOWN
+    title = {"text": text, "font": {"size": 14}}
     return {
         "data": [trace],
         "layout": {"title": title, "polar": polar, "margin": {"t": 60, "b": 30}},
@@ -148,14 +168,19 @@ def _polar(load: Array, direction: Array) -> Figure:
 
 
 def _spectra(run: RunLike, joint: str, half: int) -> Figure:
-    data = []
+    data, surest = [], True
     kind, unit, components = HALVES[half]
     for component in components:
         found = spectrum(run, joint, component)
         frequency = found["frequency"].values[1:]
-        data.append(_line(component, packed(frequency), np.maximum(found.values[1:], 1e-30)))
+        sure = bool(found.coords.get("determinate", True))
+        surest &= sure
+        values = np.maximum(found.values[1:], 1e-30)
+        name, line = _shown(component, sure), _dotted(sure)
+        data.append(_line(name, packed(frequency), values, line=line))
     density = "N²/Hz" if unit == "N" else "N² m²/Hz"
-    layout = _layout(f"Spectral density of the {kind}", "frequency [Hz]", density)
+    title = f"Spectral density of the {kind}" + ("" if surest else _NOT_KNOWN)
+    layout = _layout(title, "frequency [Hz]", density)
     layout["xaxis"]["type"] = layout["yaxis"]["type"] = "log"
     layout["yaxis"]["exponentformat"] = "power"
     return {"data": data, "layout": layout}
@@ -169,7 +194,9 @@ def _duration(run: RunLike, joint: str, model: Model) -> Figure:
         "y": packed(found.values),
         "width": float(found.attrs["class_width"]),
     }
-    return {"data": [trace], "layout": _layout("Load duration", "force [N]", "time [s]")}
+    sure = bool(found.coords.get("determinate", True))
+    title = "Load duration" + ("" if sure else " (one choice of many)")
+    return {"data": [trace], "layout": _layout(title, "force [N]", "time [s]")}
 
 
 def joint_figures(
@@ -186,12 +213,13 @@ def joint_figures(
     for j, joint in enumerate(joints):
         figures = _histories(load[:, j], run, where[j])
         if shares is not None:
-            figures += _areas(shares[:, :, j], causes)
+            figures += _areas(shares[:, :, j], causes, _components(run, where[j]))
         own, direction = load[:, j], directions[where[j]]
+        known = _quantities(run, machine, where[j], direction)
         optional: tuple[tuple[Callable[..., Figure], tuple[Any, ...]], ...] = (
-            (_engineering, (own, direction, 0)),
-            (_engineering, (own, direction, 1)),
-            (_polar, (own, direction)),
+            (_engineering, (own, direction, 0, known)),
+            (_engineering, (own, direction, 1, known)),
+            (_polar, (own, direction, known)),
             (_duration, (run, joint, machine)),
             (_spectra, (run, joint, 0)),
             (_spectra, (run, joint, 1)),
@@ -204,14 +232,35 @@ def joint_figures(
     return made
 
 
-def _engineering(load: Array, direction: Array, half: int) -> Figure:
+def _quantities(run: RunLike, model: Model, joint: int, direction: Array) -> dict[str, bool]:
+    """Whether what a figure shows of a joint with this axis is determinate, by its name."""
+    names = [name for pair in _ALONG_AND_ACROSS for name in pair]
+    if np.isnan(direction).any():
+        return dict.fromkeys(names, True)
+    found = {name: signal_of(run, model, joint, name, direction) for name in names}
+    return {name: one is not False for name, one in found.items()}
+
+
+_ALONG_AND_ACROSS = (("axial", "radial"), ("torque", "tilting_moment"))
+
+
+def _engineering(load: Array, direction: Array, half: int, known: Mapping[str, bool]) -> Figure:
     """Parts along and across the axis: apart, so that neither scale hides the other."""
     if np.isnan(direction).any():
         raise InputError("no axis")
     found = derive(load[:, None], direction[None])
-    names = (("axial", "radial"), ("torque", "tilting_moment"))[half]
-    data = [_line(name.replace("_", " "), TIMES, found[name][:, 0]) for name in names]
+    names = _ALONG_AND_ACROSS[half]
+    data = [
+        _line(
+            _shown(name.replace("_", " "), known[name]),
+            TIMES,
+            found[name][:, 0],
+            line=_dotted(known[name]),
+        )
+        for name in names
+    ]
     title = ("Force along and across the axis", "Moment about and across the axis")[half]
+    title += "" if all(known[name] for name in names) else _NOT_KNOWN
     kind, unit, _ = HALVES[half]
     return {"data": data, "layout": _layout(title, "time [s]", f"{kind} [{unit}]")}
 

@@ -70,22 +70,30 @@ class RunPlots:
         """What each cause adds to the size of a joint's force and moment.
 
         A cause's share is its part along the total, so that the shares add up to the size; a
-        negative share relieves the joint.
+        negative share relieves the joint. Where rigid bodies do not determine a component, the
+        total is dashed, and names are in brackets.
         """
         where = joint_position(self._run, joint)
         shares = split(self._run, by).isel(joint=where)
         times, causes = shares["time"].values, [str(c) for c in shares["cause"].values]
         figure, axes = _figure(2)
+        known, first_sure = components_of(self._run), True
         for k, (axis, (half, unit, _)) in enumerate(zip(axes, HALVES, strict=True)):
+            sure = known is None or bool(known[where, 3 * k : 3 * k + 3].all())
+            first_sure = sure if k == 0 else first_sure
+            names = causes if sure else [f"({name})" for name in causes]
             parts, total = along_total(shares.values[..., 3 * k : 3 * k + 3])
             up, down = np.maximum(parts, 0), np.minimum(parts, 0)
             if causes:
-                areas = axis.stackplot(times, up.T, labels=causes, linewidth=0)
+                areas = axis.stackplot(times, up.T, labels=names, linewidth=0)
                 colours = [area.get_facecolor()[0] for area in areas]
                 axis.stackplot(times, down.T, colors=colours, linewidth=0)
-            axis.plot(times, total, color="black", linewidth=1.2, label="total")
+            style = "-" if sure else "--"
+            label = "total" if sure else "(total)"
+            axis.plot(times, total, style, color="black", linewidth=1.2, label=label)
             axis.set_ylabel(f"{half} [{unit}]")
-        axes[0].legend(loc="upper right", ncols=4, frameon=False)
+            if k == 0 or sure != first_sure:
+                axis.legend(loc="upper right", ncols=4, frameon=False)
         figure.suptitle(f"Load of {joint} by cause")
         missed = missed_peaks(self._run, [joint])
         if missed:

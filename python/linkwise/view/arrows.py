@@ -16,7 +16,7 @@ _STOPS = np.array(
 )
 _USE_STOPS = np.array([[10, 70, 150], [225, 170, 0], [215, 80, 0]], dtype=float)
 _OVERLOADED, _UNRATED = np.array([110.0, 0, 20]), np.array([110.0, 110, 110])
-_NOTHING = 1e-9  # of a size: three.js cannot invert a transform of scale 0
+NOTHING = 1e-9  # of a size: three.js cannot invert a transform of scale 0
 
 
 class Instances(NamedTuple):
@@ -91,5 +91,5 @@ def instances(
     up = np.array([0.0, 0.0, 1.0])
     directions = np.where(size[:, None] > 0, vectors / np.maximum(size, 1e-300)[:, None], up)
     colors = colors_of(share) if use is None else colors_of_use(use)
-    scales = longest * np.maximum(share, _NOTHING)
+    scales = longest * np.maximum(share, NOTHING)
     return Instances(points, turning_z_to(directions), scales, colors)

@@ -19,10 +19,11 @@ import numpy.typing as npt
 
 from linkwise import _core
 from linkwise._core import InputError
-from linkwise.base import Array
+from linkwise.base import AnyArray, Array
 from linkwise.io import writing
 from linkwise.view import arrows
 from linkwise.view.live import View
+from linkwise.view.load_plot import lines_of
 from linkwise.view.panel import legend
 from linkwise.view.places import Places
 from linkwise.view.pose import Pose
@@ -55,7 +56,8 @@ class Animation(NamedTuple):
 
     poses: (frames, n, 7: position, quaternion with its scalar first) of the joints' places, then of
     those links' frames that are not one of them; link_poses: where each link's is in there;
-    loads: (frames, causes, n_joints, 6) of the causes named.
+    loads: (frames, causes, n_joints, 6) of the causes named; known: (frames or 1, n_joints, 2)
+    which forces and moments are determinate, None: all.
     """
 
     times: Array
@@ -63,6 +65,7 @@ class Animation(NamedTuple):
     link_poses: npt.NDArray[np.int64]
     loads: npt.NDArray[np.float32]
     causes: list[str]
+    known: AnyArray | None = None
 
 
 class Blob:
@@ -164,7 +167,9 @@ def _still(source: Source) -> Animation:
     q = pose.assembled(source.first_position, None)
     where = _link_poses(model, places, q)
     poses, loads = _poses(model, places, q, where)[None], pose.loads(q)[None, None]
-    return Animation(np.zeros(1), poses.astype(np.float32), where, loads.astype(np.float32), [])
+    known = None if source.known is None else source.known.at(q)[None]
+    still = poses.astype(np.float32), where, loads.astype(np.float32)
+    return Animation(np.zeros(1), *still, [], known)
 
 
 def _film(source: Source) -> Animation:
@@ -186,7 +191,18 @@ def _film(source: Source) -> Animation:
     if causes:
         assert recording.causes is not None
         loads[:] = recording.causes.shares(chosen)[:, :, : loads.shape[2]]
-    return Animation(recording.times[chosen], poses, where, loads, causes)
+    known = _known(source, chosen) if parts else None
+    return Animation(recording.times[chosen], poses, where, loads, causes, known)
+
+
+def _known(source: Source, samples: Any) -> AnyArray | None:
+    """(samples, or 1 where they are alike; joints, 2) what is determinate, None: all."""
+    recording = source.recording
+    if source.known is None or recording is None:
+        return None
+    looked = samples if source.known.varies else samples[:1]
+    found = np.array([source.known.at(recording.position(sample)) for sample in looked])
+    return found[:1] if (found == found[0]).all() else found
 
 
 def _content(source: Source, scene: Scene, animation: Animation) -> dict[str, Any]:
@@ -207,9 +223,6 @@ def _content(source: Source, scene: Scene, animation: Animation) -> dict[str, An
     if use is not None:
         rating = {"directions": np.nan_to_num(use.directions, nan=np.inf), "limits": use.limits}
     chosen = animation.causes
-    known = source.determinate
-    if known is not None:
-        known = np.all(known.reshape(-1, 2, 3), axis=2)
     if recording is not None and recording.causes is not None:
         chosen = sorted(recording.causes.chosen)
     return {
@@ -227,7 +240,21 @@ def _content(source: Source, scene: Scene, animation: Animation) -> dict[str, An
         "legends": [legend(largest, by_rating) for by_rating in (False, True)],
         "colors": arrows.color_table(),
         "film": recording is not None,
-        "known": None if known is None else known.reshape(-1).tolist(),
+        **_marks(source, animation),
+    }
+
+
+def _marks(source: Source, animation: Animation) -> dict[str, Any]:
+    """What is dashed, dotted or in brackets: `known` per frame or once, joint and half, null where
+    all is; `sometimes` open, per joint and half; `lines` of the plots of each joint."""
+    known = source.known
+    if known is None or animation.known is None:
+        return {"known": None, "sometimes": None, "lines": None}
+    lines = [[lines_of(half, own) for half in (0, 1)] for own in known.throughout]
+    return {
+        "known": animation.known.astype(np.int32).reshape(-1),
+        "sometimes": known.sometimes.reshape(-1).tolist(),
+        "lines": lines,
     }
 
 

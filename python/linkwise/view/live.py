@@ -12,6 +12,7 @@ import numpy as np
 
 from linkwise.base import lengths
 from linkwise.view.joint_sliders import JointSliders
+from linkwise.view.known import elsewhere
 from linkwise.view.load_plot import LoadPlot
 from linkwise.view.panel import (
     JointChoice,
@@ -90,7 +91,10 @@ class View:
             names = self.scene.places.names
             self._choice = JointChoice(server, self.scene, names, self._requests)
             if recording is not None:
-                self._plot = LoadPlot(server, recording)
+                known = self._source.known
+                self._plot = LoadPlot(
+                    server, recording, None if known is None else known.throughout
+                )
                 self._plot.choose(0)
             causes = recording.causes if recording is not None else None
             add_load_choices(
@@ -180,9 +184,11 @@ class View:
     def _tell(self, head: str, load: np.ndarray, tail: str = "") -> None:
         if self._choice is not None:
             sizes = [f"{size:.4g}" for size in lengths(load.reshape(2, 3))]
-            if self._source.determinate is not None:
-                known = self._source.determinate[self._joint].reshape(2, 3).all(axis=1)
+            if self.scene.known is not None and self._source.known is not None:
+                known = self.scene.known[self._joint]
                 sizes = [x if one else f"({x})" for x, one in zip(sizes, known, strict=True)]
+                other = elsewhere(known, self._source.known.sometimes[self._joint])
+                tail = "; ".join(filter(None, (other, tail)))
             tail = f"; {tail}" if tail else ""
             self._choice.tell(f"{head}{sizes[0]} N, {sizes[1]} N m{tail}")
 

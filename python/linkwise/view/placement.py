@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from linkwise.base import Array
-from linkwise.view.arrows import in_world, instances
+from linkwise.base import AnyArray, Array
+from linkwise.view.arrows import NOTHING, in_world, instances
 from linkwise.view.shapes import quaternions, turning_z_to
 
 if TYPE_CHECKING:
@@ -25,11 +25,13 @@ Indices = npt.NDArray[np.int64]
 @dataclass
 class Snapshot:
     """The machine at one instant: frames of links (n, 4, 4), of joints as `Places` has them,
-    and loads (n_joints, 6) of all joints with a load."""
+    loads (n_joints, 6) of all joints with a load, and which forces and moments (n_joints, 2) of
+    them are determinate (None: all)."""
 
     links: Array
     joints: Array
     loads: Array | None
+    known: AnyArray | None = None
 
 
 @dataclass
@@ -131,11 +133,13 @@ class Marks:
 
 @dataclass
 class Loads:
-    """Arrows of forces (half 0) or arcs of moments (half 1) at the points of these joints."""
+    """Arrows of forces (half 0) or arcs of moments (half 1) at the points of these joints; of the
+    loads that are determinate where they are `known`, of the others where they are not."""
 
     half: int
     style: LoadStyle
     joints: Indices
+    known: bool = True
 
     def __call__(self, snapshot: Snapshot) -> dict[str, Any]:
         if snapshot.loads is None:
@@ -147,15 +151,20 @@ class Loads:
             use = self.style.use.of(snapshot.loads, self.half)[self.joints]
         points = frames[:, :3, 3]
         made = instances(points, vectors, self.style.largest[self.half], self.style.longest, use)
+        scales = made.scales
+        if snapshot.known is not None:
+            shown = snapshot.known[self.joints, self.half] == self.known
+            scales = np.where(shown, scales, self.style.longest * NOTHING)
         return {
             "batched_positions": made.positions,
             "batched_wxyzs": made.quaternions,
-            "batched_scales": made.scales,
+            "batched_scales": scales,
             "batched_colors": made.colors,
         }
 
     def plan(self) -> dict[str, Any]:
-        return {"kind": "loads", "half": self.half, "joints": self.joints}
+        plan = {"kind": "loads", "half": self.half, "joints": self.joints}
+        return {**plan, "known": int(self.known)}
 
 
 @dataclass

@@ -123,7 +123,7 @@
     marks: ({points}) => ({batched_positions: points}),
 
     loads(moment, layer, style) {
-      const {poses, loads} = moment, {half, joints} = layer, n = joints.length;
+      const {poses, loads, known} = moment, {half, joints} = layer, n = joints.length;
       const points = new Float32Array(3 * n);
       const wxyzs = new Float32Array(4 * n), scales = new Float32Array(n);
       const colors = new Uint8Array(3 * n);
@@ -143,7 +143,8 @@
         } else {
           turnZTo(wxyzs, k, 0, 0, 1);
         }
-        scales[k] = style.longest * Math.max(share, NOTHING);
+        const shown = !known || known[2 * joint + half] === layer.known;
+        scales[k] = style.longest * (shown ? Math.max(share, NOTHING) : NOTHING);
         if (!uses) mix(colors, k, style.colors.size, share);
         else if (Number.isNaN(uses[joint])) colors.set(style.colors.unrated, 3 * k);
         else if (uses[joint] > 1) colors.set(style.colors.overloaded, 3 * k);
@@ -292,13 +293,23 @@
       for (let k = 0; k < this.n; k++) {
         for (let c = 0; c < 3; c++) points[3 * k + c] = here[7 * k + c];
       }
-      return {poses: here, points, loads: this.parts ? this.loadsAt(frame) : null};
+      const loads = this.parts ? this.loadsAt(frame) : null;
+      return {poses: here, points, loads, known: this.knownAt(frame)};
+    }
+
+    // Which forces and moments are determinate at a frame, null: all.
+    knownAt(frame) {
+      const {known} = this.data, size = 2 * this.n;
+      return known && known.subarray(known.length > size ? size * frame : 0).subarray(0, size);
     }
 
     choose(joint) {
       this.joint = joint;
       this.redraw = true;
       if (!this.plots.length) return;
+      if (this.data.lines) {
+        this.plots.forEach((uuid, half) => this.update(uuid, {series: this.data.lines[joint][half]}));
+      }
       const total = this.data.times.length, count = Math.min(total, MOST_PLOTTED);
       this.plotted = Array.from({length: count}, (_, k) =>
         Math.floor(k * (total - 1) / Math.max(1, count - 1)));
@@ -353,11 +364,15 @@
       if (!load) return;
       const head = this.data.film ? `t = ${general(this.data.times[frame])} s: ` : "held still: ";
       const [force, moment] = [0, 3].map(i => Math.hypot(load[i], load[i + 1], load[i + 2]));
+      const known = this.knownAt(frame), {sometimes} = this.data;
       const bracketed = (size, half) => {
-        const {known} = this.data, shown = general(size);
+        const shown = general(size);
         return !known || known[2 * this.joint + half] ? shown : `(${shown})`;
       };
-      this.tell(`${head}${bracketed(force, 0)} N, ${bracketed(moment, 1)} N m`);
+      const other = ["force", "moment"].filter(
+        (_, half) => known && known[2 * this.joint + half] && sometimes[2 * this.joint + half]);
+      const tail = other.length ? `; ${other.join(" and ")} not determined in other poses` : "";
+      this.tell(`${head}${bracketed(force, 0)} N, ${bracketed(moment, 1)} N m${tail}`);
     }
 
     plot() {

@@ -80,9 +80,7 @@ class Scene:
         self._few = model.n_joints <= _MANY
         self.layers: dict[str, list[Layer]] = defaultdict(list)
         self.joint_marks: Any = None
-        self._open: AnyArray = np.zeros(
-            (len(self.places.names), 2), dtype=np.bool_
-        )  # force, moment
+        self._known = source.known
         start = source.first_position
         if source.recording is not None:
             start = source.recording.position(0)
@@ -102,7 +100,7 @@ class Scene:
             peaks = np.zeros(len(self.places.names))
             if source.recording is not None:
                 peaks = source.recording.peaks
-            self._add_loads(shown=shown, peaks=peaks, known=source.determinate)
+            self._add_loads(shown=shown, peaks=peaks)
         self._frame_camera(server)
         for name, shown in self.toggles.items():
             self.toggle(name, shown)
@@ -111,7 +109,13 @@ class Scene:
 
     def at(self, q: Array, loads: Array | None) -> Snapshot:
         links = _core.link_poses(self._model, q)
-        return Snapshot(links, self.places.frames(links, q), loads)
+        known = None if loads is None or self._known is None else self._known.at(q)
+        return Snapshot(links, self.places.frames(links, q), loads, known)
+
+    @property
+    def known(self) -> AnyArray | None:
+        """(joints, half) [bool]: which of the loads shown are determinate, None: all."""
+        return self._snapshot.known
 
     def show(self, snapshot: Snapshot) -> None:
         self._snapshot = snapshot
@@ -288,13 +292,11 @@ class Scene:
 
     # -- loads ------------------------------------------------------------------------------
 
-    def _add_loads(self, *, shown: bool, peaks: Array, known: AnyArray | None) -> None:
+    def _add_loads(self, *, shown: bool, peaks: Array) -> None:
         """Arrows and arcs, dashed ones where rigid bodies do not determine the load; of large
         machines at joints here and there and at the most loaded one, and, unless switched on,
         hidden ones at every joint.
         """
-        if known is not None:
-            self._open = np.any(~known.reshape(-1, 2, 3), axis=2)
         every = np.arange(len(self.places.names))
         arrow, arc = unit_arrow(10), unit_arc(6, 28)
         if not self._few:
@@ -311,8 +313,13 @@ class Scene:
     ) -> None:
         dashed = (dashed_arrow(), dashed_arc())
         for half, (toggle, mesh) in enumerate(zip((forces, moments), meshes, strict=True)):
-            is_open = self._open[joints, half]
-            for shape, some in ((mesh, joints[~is_open]), (dashed[half], joints[is_open])):
+            is_open = np.zeros(len(joints), dtype=np.bool_)
+            if self._known is not None:
+                is_open = self._known.possible[joints, half]
+            for shape, some, known in (
+                (mesh, joints, True),
+                (dashed[half], joints[is_open], False),
+            ):
                 if not some.size:
                     continue
                 handle = self._add(
@@ -323,7 +330,7 @@ class Scene:
                     batched_scales=np.full(some.size, 1e-9),
                     batched_colors=np.zeros((some.size, 3), dtype=np.uint8),
                 )
-                self.layers[toggle].append(Layer(handle, Loads(half, self.style, some)))
+                self.layers[toggle].append(Layer(handle, Loads(half, self.style, some, known)))
 
     # -- view -------------------------------------------------------------------------------
 

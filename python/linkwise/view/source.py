@@ -12,11 +12,11 @@ import numpy as np
 
 from linkwise import _core
 from linkwise._core import InputError, Model
-from linkwise.base import AnyArray, Array, rows_per_block
+from linkwise.base import Array, rows_per_block
 from linkwise.io.complaint import near, shorten
 from linkwise.io.load import load
 from linkwise.io.urdf_visuals import Appearance, read_appearance
-from linkwise.loads.determinate import FEW_ROWS, components_of, loop_rows
+from linkwise.loads.determinate import FEW_ROWS, loop_rows
 from linkwise.loads.extremes import loads_at_peaks, missed_peaks
 from linkwise.loads.samples import held_model, model_of, rows
 from linkwise.loads.undecided import undecided_loads
@@ -24,6 +24,7 @@ from linkwise.notes import plain_warnings, warnings_of
 from linkwise.record.model import read_model
 from linkwise.results import Run, open_run
 from linkwise.scenario import load_ratings, load_scenario, ratings_in
+from linkwise.view.known import Known, known_in
 from linkwise.view.shown_loads import CauseLoads
 
 if TYPE_CHECKING:
@@ -140,8 +141,8 @@ class Source:
     """A model, how its links look, and the samples of a run (None: the model alone).
 
     notes: what is not shown as it looks; warnings: what was ignored or assumed when the model was
-    read; determinate: (joints, 6) which loads are known, None: all; start: the position (nq,) in
-    which a model alone is first shown, as near as its loops can be closed with the joints `held`
+    read; known: which loads are determinate, None: all; start: the position (nq,) in which a model
+    alone is first shown, as near as its loops can be closed with the joints `held`
     where they are.
     """
 
@@ -152,7 +153,7 @@ class Source:
     ratings: Mapping[str, Rating] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     warnings: Sequence[Mapping[str, str]] = ()
-    determinate: AnyArray | None = None
+    known: Known | None = None
     start: Array | None = None
     held: Sequence[str] = ()
 
@@ -191,21 +192,20 @@ def open_source(target: PathLike, options: Options) -> Source:
 
 def _known(
     model: Model, start: Array | None, held: Sequence[str], notes: list[str]
-) -> AnyArray | None:
-    """Which components (joints, 6) of its loads are determinate in the pose that is shown first,
-    None where all are or nobody can say; adds to the notes what would decide the others."""
+) -> Known | None:
+    """Which of its loads are determinate, None where nobody can say; adds to the notes what would
+    decide those that are open in the pose that is shown first."""
     if not 0 < loop_rows(model) <= FEW_ROWS:
         return None
     q = model.initial_configuration() if start is None else start
     try:
         closed = _core.assemble(model, q, np.zeros(model.nv), list(held))["q"]
         known = np.asarray(_core.indeterminacy(model, closed).determinate, dtype=np.bool_)
-        if known.all():
-            return None
-        notes += [_DASHED, *(one.text for one in undecided_loads(model, closed))]
+        if not known.all():
+            notes += [_DASHED, *(one.text for one in undecided_loads(model, closed))]
     except InputError:  # the view says where loops stay open
-        return None
-    return known
+        known = np.ones((model.n_joints + model.n_loops, 6), dtype=np.bool_)
+    return Known(model, known)
 
 
 _DASHED = "dashed arrows and numbers in brackets are not determined by rigid bodies"
@@ -258,8 +258,8 @@ def _open_run(path: Path, options: Options) -> Source:
     missed = missed_peaks(run) if options.loads else []
     if missed:
         notes.append(f"arrows and colours are of the samples: {missed[0]}")
-    known = components_of(run) if options.loads else None
-    if known is not None and not known.all():
+    known = known_in(run, model) if options.loads else None
+    if known is not None:
         notes.append(_DASHED)
     return Source(model.name, model, appearance, recording, ratings, notes, run.warnings, known)
 

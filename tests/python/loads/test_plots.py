@@ -95,3 +95,35 @@ def test_what_is_one_choice_of_many_is_dashed():
     assert (styles["fx"], styles["fy"], styles["(fz)"]) == ("-", "-", "--")
     styles = {line.get_label(): line.get_linestyle() for line in moment.get_lines()}
     assert (styles["(nx)"], styles["(ny)"], styles["nz"]) == ("--", "--", "-")
+
+
+def test_figures_of_loads_that_are_open():
+    """A planar linkage: fx, fy and nz are determinate, so the sizes and their shares are not."""
+    from linkwise.plot.report_figures import joint_figures
+
+    machine = lw.scenes.benchmark("four_bars", n=1)
+    run = lw.simulate(machine.model, duration=0.2, every=0.01, q0=machine.q0, v0=machine.v0)
+    for axis in run.plot.split("A0").axes:
+        (total,) = axis.get_lines()
+        assert total.get_label() == "(total)"
+        assert total.get_linestyle() == "--"
+        labels = [area.get_label() for area in axis.collections if area.get_label()[0] != "_"]
+        assert labels
+        assert all(label[0] == "(" for label in labels)
+    made = {f["layout"]["title"]["text"]: f for f in joint_figures(run, ["A0"], 1, None)["A0"]}
+    note = "; dotted and in brackets: one choice of many"
+    for title in ("Force by cause", "Moment by cause"):
+        *areas, total = made[title + note]["data"]
+        assert total["name"] == "(total)"
+        assert total["line"]["dash"] == "dot"
+        assert all(area["name"][0] == "(" for area in areas)
+    names = {
+        title: [line["name"] for line in figure["data"]]
+        for title, figure in made.items()
+        if "along" in title or "about and" in title or "Spectral" in title
+    }
+    assert names["Force along and across the axis" + note] == ["(axial)", "radial"]
+    assert names["Moment about and across the axis" + note] == ["torque", "(tilting moment)"]
+    assert names["Spectral density of the force" + note] == ["fx", "fy", "(fz)"]
+    assert "Radial force about the axis, in the joint frame" in made
+    assert "Load duration (one choice of many)" in made

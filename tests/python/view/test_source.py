@@ -214,10 +214,10 @@ def test_which_loads_are_known_is_opened_with_them(tmp_path):
     model = door("revolute")
     run = lw.simulate(model, duration=0.05, output=tmp_path / "door.zarr")
     source = open_source(run.path, Options())
-    np.testing.assert_array_equal(source.determinate, run.determinate)
+    np.testing.assert_array_equal(source.known.throughout, run.determinate)
     assert any("dashed arrows" in note for note in source.notes)
     source = open_source("examples/data/watt.urdf", Options())
-    assert source.determinate.any()
-    assert not source.determinate.all()
+    assert source.known.throughout.any()
+    assert not source.known.throughout.all()
     assert any("hold each other" in note for note in source.notes)
-    assert open_source("examples/data/hoist.urdf", Options()).determinate is None
+    assert open_source("examples/data/hoist.urdf", Options()).known is None
