@@ -342,6 +342,13 @@ class Motion(Drive):
     def check(self, model: Model, joint: str, end: float) -> None:
         loop = model.load_index(joint) - model.n_joints
         dofs = model.v_slice(joint) if loop < 0 else model.loop_slices[loop][1]
+        places = model.q_slice(joint) if loop < 0 else model.loop_slices[loop][0]
+        if places.stop - places.start != dofs.stop - dofs.start:
+            raise InputError(
+                "motion: needs angles or distances, and this joint has a quaternion; let three "
+                "hinges stand for it (and sliders, where it slides), with links without mass "
+                "between them, and give their motions, or drive it by torque"
+            )
         if isinstance(self.value, Table):
             first, last = self.value.times[0], self.value.times[-1]
             if first > 0 or last < end * (1 - 1e-12):
