@@ -522,8 +522,7 @@ def simulate(
     tell(warnings_of(model), reading=False)
     timeless = partial(_timeless, simulation, schema, determinacy)
     recorder = _recorder(model, schema, attrs, sampled.size, output, timeless)
-    doubt = partial(_solver_doubt, options, simulation.step_tolerance / 10)
-    told = doubt, ignored, determinacy
+    told = partial(_solver_doubt, options, simulation.step_tolerance / 10), ignored, determinacy
     run, ending = _record(model, simulation, recorder, schema, sampled, progress, *told)
     if on_failure == "raise":
         raise_failure(model, ending, run)
