@@ -278,7 +278,7 @@ Raises:
 
 }  // namespace
 
-void bind_builder(nb::module_& m) {
+nb::class_<ModelBuilder> bind_builder(nb::module_& m) {
   bind_note(m);
   nb::class_<ModelBuilder> builder(
       m, "ModelBuilder",
@@ -338,6 +338,7 @@ Args:
 Raises:
     InputError: what is wrong, with the element and the remedy.)");
   bind_chain(m);
+  return builder;
 }
 
 }  // namespace linkwise::bindings

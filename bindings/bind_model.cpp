@@ -82,6 +82,10 @@ PyModel* with_link(const PyModel& self, const std::string& link, nb::handle mass
                    nb::handle inertia) {
   ModelSpec spec = self.model->spec();
   LinkSpec& old = spec.links[self.model->link_index(link)];
+  if (old.body_kind == BodyKind::beam)
+    throw InputError("link '" + link + "'" + self.model->where() +
+                     " is an elastic beam, whose section and density say what its inertia is; "
+                     "change these where it is made flexible");
   LinkSpec given =
       link_spec(link, mass.is_none() ? old.mass : real_number(mass, "mass"), com, inertia);
   if (com.is_none()) given.com = old.com;
@@ -503,7 +507,7 @@ bytes that are no model.)")
 
 }  // namespace
 
-void bind_model(nb::module_& m) {
+void bind_model(nb::module_& m, nb::class_<ModelBuilder>& builder) {
   ModelClass c(m, "Model", "An immutable multibody model, safe to share between threads; pickles.");
   bind_sizes(c);
   bind_joints(c);
@@ -515,6 +519,7 @@ void bind_model(nb::module_& m) {
   bind_frame_placement(c);
   bind_variants(c);
   bind_bearings(c);
+  bind_flexible(c, builder);
   bind_storage(c);
 }
 

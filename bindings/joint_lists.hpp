@@ -1,5 +1,6 @@
 #pragma once
 // Model as Python's class, and what a joint says of itself as lists.
+#include "linkwise/model/builder.hpp"
 #include "linkwise/model/joint_types.hpp"
 #include "numbers.hpp"
 #include "py_model.hpp"
@@ -33,5 +34,7 @@ inline nb::tuple labels_of(const JointSpec& joint) {
 void bind_loop_joints(ModelClass& c);
 /// What joints yield to their loads.
 void bind_bearings(ModelClass& c);
+/// Elastic links.
+void bind_flexible(ModelClass& c, nb::class_<ModelBuilder>& builder);
 
 }  // namespace linkwise::bindings

@@ -36,15 +36,16 @@ NB_MODULE(LINKWISE_MODULE_NAME, m) {
 Raises:
     InputError: complex numbers, truth values, text, dates, records, objects, masked values. NumPy
         would turn most of them into numbers without a word.)");
-  linkwise::bindings::bind_builder(m);
+  auto builder = linkwise::bindings::bind_builder(m);
   linkwise::bindings::bind_frame(m);
-  linkwise::bindings::bind_model(m);
+  linkwise::bindings::bind_model(m, builder);
   linkwise::bindings::bind_loop_gaps(m);
   linkwise::bindings::bind_dynamics(m);
   linkwise::bindings::bind_inverse(m);
   linkwise::bindings::bind_causes(m);
   linkwise::bindings::bind_indeterminacy(m);
   linkwise::bindings::bind_kinematics(m);
+  linkwise::bindings::bind_sections(m);
   linkwise::bindings::bind_simulation(m);
   linkwise::bindings::bind_batch_simulation(m);
   linkwise::bindings::bind_solve(m);

@@ -30,9 +30,9 @@ TARGETS: tuple[str, ...]
 # Parameters that a binding takes as a Python object, by their name.
 ARRAYS = (
     "acceleration axes axis breakpoints child_point child_rotation child_translation com "
-    "directions external f gravity guess inertia initial point loop_prescribed "
+    "directions end external f gravity guess inertia initial joint_load point loop_prescribed "
     "loop_tau offset origin preload prescribed q q0 rotation target tau times translation turn "
-    "v v0 value values"
+    "v v0 value values z"
 )
 PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "arg": "Any",  # without a name: what pickling has kept
@@ -43,6 +43,13 @@ PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "samples": "tuple[npt.ArrayLike, npt.ArrayLike]",
     "factors": "Mapping[str, float | Sequence[float]]",
     "fn": "Callable[..., Any]",
+    "section": "Any",  # what has area, Iy, Iz and J
+    "E": "float",
+    "G": "float",
+    "density": "float",
+    "damping": "float",
+    "bodies": "int",
+    "interior_modes": "int",
     "mass": "float",
     "radial": "float | None",
     "axial": "float | None",
@@ -71,6 +78,7 @@ RETURNS = {
     "DynamicsMethod.evaluate": "tuple[Array, Array, Report]",
     "DynamicsMethod.follow": "dict[str, Any]",
     "Frame.__getstate__": "tuple[str, Array, Array]",
+    "Model.beam_lengths": "dict[str, float]",
     "Model.bearing_joints": "list[str]",
     "Model.bearings": "dict[str, dict[str, Any]]",
     "Model.child_link_names": "list[str]",

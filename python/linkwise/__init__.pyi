@@ -56,6 +56,7 @@ from linkwise.drives import Table as Table
 from linkwise.drives import Torque as Torque
 from linkwise.drives import Wrench as Wrench
 from linkwise.drives import external_wrenches as external_wrenches
+from linkwise.flexible.section import Section as Section
 from linkwise.io.load import load as load
 from linkwise.loads.undecided import undecided_loads as undecided_loads
 from linkwise.notes import ModelWarning as ModelWarning

@@ -61,7 +61,7 @@ def run(*command, cwd):
 
 def run_program(program, root):
     """Compiles a program with all that builds a model, as one text to be quick, and runs it."""
-    layers = ("base", "exec", "graph", "model")
+    layers = ("base", "bodies", "exec", "graph", "model")
     paths = [path for layer in layers for path in sorted((root / CORE / layer).glob("*.cpp"))]
     text = "".join(f'#include "{path}"\n' for path in paths)
     (root / "core.cpp").write_text(text, encoding="utf-8")

@@ -12,6 +12,7 @@ from linkwise.loads.fatigue import cycles, damage_equivalent, load_duration, spe
 from linkwise.loads.frames import in_frame
 from linkwise.loads.peaks import envelope, peak_loads, summary
 from linkwise.loads.rating import Rating, margins
+from linkwise.loads.sections import section_loads
 
 __all__ = [
     "QUANTITIES",
@@ -26,6 +27,7 @@ __all__ = [
     "margins",
     "peak_loads",
     "quantities",
+    "section_loads",
     "spectrum",
     "split",
     "split_at_peaks",

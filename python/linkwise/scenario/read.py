@@ -30,6 +30,7 @@ from linkwise.scenario.arguments import (
     with_loops,
     with_properties,
 )
+from linkwise.scenario.flexible_links import with_flexible_links
 from linkwise.scenario.schema import RatingsFile, ScenarioFile, describe, keys_at
 from linkwise.scenario.toml_slips import diagnose
 
@@ -63,7 +64,8 @@ class Scenario(ScenarioSource):
         """
         with quiet():  # the scenario may cure what is wrong in the model's file
             bare = self._bare_model()
-        model = with_properties(self, with_inertias(self, with_loops(self, bare)))
+        model = with_flexible_links(self, with_inertias(self, with_loops(self, bare)))
+        model = with_properties(self, model)
         tell(warnings_of(model), reading=True)
         return model
 

@@ -6,111 +6,31 @@ checked in :mod:`linkwise.scenario.arguments`, once the model is loaded.
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PlainValidator,
-    create_model,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from linkwise._core import numerics
 from linkwise.io.complaint import shorten
-from linkwise.io.units import check_dimension, parse_quantity
+from linkwise.io.units import check_dimension
+from linkwise.scenario.fields import (
+    Acceleration,
+    Angles,
+    Count,
+    Direction,
+    Factors,
+    Limit,
+    Number,
+    Point,
+    Quantity,
+    Scalar,
+    Time,
+    Vector,
+    along_or_all,
+    of,
+)
 
 Interpolation = Literal["linear", "cubic"]
-
-
-class Quantity(NamedTuple):
-    """A number in SI and the dimension that its unit stated, None where no unit was given."""
-
-    value: float
-    dimension: str | None
-
-
-def _quantity(value: Any, infinite: bool = False) -> Quantity:
-    if isinstance(value, str):
-        return Quantity(*parse_quantity(value))
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError("is not a number; give a number or a text such as '30 deg'")
-    try:
-        number = float(value)
-    except OverflowError:
-        raise ValueError("is too large for a double; give a smaller number") from None
-    if not math.isfinite(number) and not (infinite and math.isinf(number)):
-        raise ValueError(f"is {value}, not a finite number; give a finite number")
-    return Quantity(number, None)
-
-
-def _quantities(value: Any) -> Quantity | list[Quantity]:
-    if isinstance(value, dict):
-        raise ValueError(
-            "is a table where a number belongs; put quotes around a joint name that holds a dot"
-        )
-    return [_quantity(v) for v in value] if isinstance(value, list) else _quantity(value)
-
-
-def _limits(value: Any) -> Quantity | list[Quantity]:
-    """As _quantities; inf and -inf are no limit."""
-    if isinstance(value, list):
-        return [_quantity(v, infinite=True) for v in value]
-    return _quantity(value, infinite=True)
-
-
-def _of(*dimensions: str) -> BeforeValidator:
-    def convert(value: Any) -> float:
-        quantity = _quantity(value)
-        check_dimension(quantity.dimension, *dimensions)
-        return quantity.value
-
-    return BeforeValidator(convert)
-
-
-def _factors(value: Any) -> float | list[float]:
-    """A number without a unit, or those of up to four powers."""
-    numbers = []
-    listed = value if isinstance(value, list) else [value]
-    if not 1 <= len(listed) <= 4:
-        raise ValueError(
-            f"has {len(listed)} numbers; give those of the coordinate and of its powers up to "
-            "the fourth"
-        )
-    for one in listed:
-        quantity = _quantity(one)
-        check_dimension(quantity.dimension, "number")
-        numbers.append(quantity.value)
-    return numbers if isinstance(value, list) else numbers[0]
-
-
-def _along_or_all(dimension: str) -> PlainValidator:
-    """One number, along an axis, or three."""
-
-    def convert(value: Any) -> float | list[float]:
-        if isinstance(value, list) and len(value) != 3:
-            raise ValueError(f"has {len(value)} numbers; give one along the axis, or three")
-        numbers = []
-        for one in value if isinstance(value, list) else [value]:
-            quantity = _quantity(one)
-            check_dimension(quantity.dimension, dimension)
-            numbers.append(quantity.value)
-        return numbers if isinstance(value, list) else numbers[0]
-
-    return PlainValidator(convert)
-
-
-Scalar = Annotated[Quantity, PlainValidator(_quantity)]
-Vector = Annotated[Quantity | list[Quantity], PlainValidator(_quantities)]
-Limit = Annotated[Quantity | list[Quantity], PlainValidator(_limits)]
-Number = Annotated[float, _of("number")]
-Factors = Annotated[float | list[float], PlainValidator(_factors)]
-Time = Annotated[float, _of("time"), Field(gt=0)]
-Count = Annotated[int, Field(ge=1, lt=2**31)]
-Acceleration = Annotated[float, _of("acceleration")]
 
 
 class Section(BaseModel):
@@ -241,10 +161,6 @@ DRIVES: dict[str, type[Section]] = {
 }
 
 
-Point = Annotated[list[Annotated[float, _of("length")]], Field(min_length=3, max_length=3)]
-Angles = Annotated[list[Annotated[float, _of("angle")]], Field(min_length=3, max_length=3)]
-
-
 class WrenchSection(_Tabled):
     """A force and moment at a point of a link, constant or from a table of six columns.
 
@@ -271,9 +187,9 @@ class WrenchSection(_Tabled):
         return self
 
 
-Mass = Annotated[float, _of("number", "mass"), Field(ge=0)]
+Mass = Annotated[float, of("number", "mass"), Field(ge=0)]
 Inertia = Annotated[
-    list[Annotated[float, _of("number", "inertia")]], Field(min_length=3, max_length=6)
+    list[Annotated[float, of("number", "inertia")]], Field(min_length=3, max_length=6)
 ]
 
 
@@ -320,9 +236,6 @@ class JointSection(Section):
     limit_damping: Vector | None = None
 
 
-Direction = Annotated[list[Number], Field(min_length=3, max_length=3)]
-
-
 class LoopSection(JointSection):
     """A joint that closes a loop between two links, with its point and axes on both of them.
 
@@ -349,7 +262,7 @@ class LoopSection(JointSection):
     child_rotation: Angles | None = None
     axis: Direction | None = None
     axes: Annotated[list[Direction], Field(min_length=2, max_length=2)] | None = None
-    pitch: Annotated[float, _of("length per angle")] | None = None
+    pitch: Annotated[float, of("length per angle")] | None = None
 
     @model_validator(mode="after")
     def _fits(self) -> LoopSection:
@@ -368,26 +281,63 @@ class RodSection(Section):
 
     parent: str
     child: str
-    length: Annotated[float, _of("length"), Field(gt=0)]
+    length: Annotated[float, of("length"), Field(gt=0)]
     point: Point | None = None
     child_point: Point | None = None
 
 
-Turn = Annotated[list[Annotated[float, _of("angle")]], Field(min_length=3, max_length=3)]
+Turn = Annotated[list[Annotated[float, of("angle")]], Field(min_length=3, max_length=3)]
 
 
 class BearingSection(Section):
     """How stiff a joint is against the loads that it holds, rigid where nothing is given, and what
     it does not fit by."""
 
-    radial: Annotated[float, _of("stiffness"), Field(gt=0)] | None = None
-    axial: Annotated[float, _of("stiffness"), Field(gt=0)] | None = None
-    tilt: Annotated[float, _of("angular stiffness"), Field(gt=0)] | None = None
-    torsion: Annotated[float, _of("angular stiffness"), Field(gt=0)] | None = None
+    radial: Annotated[float, of("stiffness"), Field(gt=0)] | None = None
+    axial: Annotated[float, of("stiffness"), Field(gt=0)] | None = None
+    tilt: Annotated[float, of("angular stiffness"), Field(gt=0)] | None = None
+    torsion: Annotated[float, of("angular stiffness"), Field(gt=0)] | None = None
     axis: Direction | None = None
-    offset: Annotated[float | list[float], _along_or_all("length")] | None = None
+    offset: Annotated[float | list[float], along_or_all("length")] | None = None
     turn: Turn | None = None
-    preload: Annotated[float | list[float], _along_or_all("force")] | None = None
+    preload: Annotated[float | list[float], along_or_all("force")] | None = None
+
+
+Length = Annotated[float, of("length"), Field(gt=0)]
+Modulus = Annotated[float, of("pressure"), Field(gt=0)]
+SecondMoment = Annotated[float, of("second moment of area"), Field(gt=0)]
+
+#: What each shape of a beam's section is given by.
+SHAPES: dict[str, tuple[str, ...]] = {
+    "round": ("diameter",),
+    "tube": ("diameter", "wall"),
+    "rectangle": ("width", "height"),
+    "box": ("width", "height", "wall"),
+    "general": ("area", "Iy", "Iz", "J"),
+}
+
+
+class FlexibleSection(Section):
+    """A link that is an elastic beam."""
+
+    section: Literal["round", "tube", "rectangle", "box", "general"]
+    diameter: Length | None = None
+    wall: Length | None = None
+    width: Length | None = None
+    height: Length | None = None
+    area: Annotated[float, of("area"), Field(gt=0)] | None = None
+    Iy: SecondMoment | None = None
+    Iz: SecondMoment | None = None
+    J: SecondMoment | None = None
+    E: Modulus
+    G: Modulus
+    density: Annotated[float, of("density"), Field(gt=0)] | None = None
+    damping: Annotated[Number, Field(ge=0)] = 0.0
+    bodies: Annotated[int, Field(ge=1)] = 1
+    interior_modes: Annotated[int, Field(ge=0)] = 2
+    stretches: bool = True
+    end: Point | None = None
+    z: Direction | None = None
 
 
 class PointSpringSection(Section):
@@ -398,15 +348,15 @@ class PointSpringSection(Section):
 
     parent: str
     child: str
-    length: Annotated[float, _of("length"), Field(ge=0)]
+    length: Annotated[float, of("length"), Field(ge=0)]
     point: Point | None = None
     child_point: Point | None = None
-    stiffness: Annotated[float, _of("stiffness")] | None = None
-    damping: Annotated[float, _of("damping")] | None = None
-    lower: Annotated[float, _of("length")] | None = None
-    upper: Annotated[float, _of("length")] | None = None
-    limit_stiffness: Annotated[float, _of("stiffness")] | None = None
-    limit_damping: Annotated[float, _of("damping")] | None = None
+    stiffness: Annotated[float, of("stiffness")] | None = None
+    damping: Annotated[float, of("damping")] | None = None
+    lower: Annotated[float, of("length")] | None = None
+    upper: Annotated[float, of("length")] | None = None
+    limit_stiffness: Annotated[float, of("stiffness")] | None = None
+    limit_damping: Annotated[float, of("damping")] | None = None
 
 
 class CouplingSection(Section):
@@ -417,8 +367,8 @@ class CouplingSection(Section):
     offset: Number = 0.0
 
 
-Force = Annotated[float, _of("force"), Field(gt=0)]
-Moment = Annotated[float, _of("moment"), Field(gt=0)]
+Force = Annotated[float, of("force"), Field(gt=0)]
+Moment = Annotated[float, of("moment"), Field(gt=0)]
 
 
 class RatingSection(Section):
@@ -488,6 +438,7 @@ class ScenarioFile(Section):
     wrench: dict[str, WrenchSection] = {}
     payload: dict[str, PayloadSection] = {}
     link: dict[str, LinkSection] = {}
+    flexible: dict[str, FlexibleSection] = {}
     joint: dict[str, JointSection] = {}
     loop: dict[str, LoopSection] = {}
     rod: dict[str, RodSection] = {}
@@ -518,6 +469,7 @@ _NAMED: dict[str, type[Section]] = {
     "wrench": WrenchSection,
     "payload": PayloadSection,
     "link": LinkSection,
+    "flexible": FlexibleSection,
     "joint": JointSection,
     "loop": LoopSection,
     "rod": RodSection,

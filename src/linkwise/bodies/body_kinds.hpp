@@ -6,10 +6,12 @@
 #include <concepts>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <tuple>
 #include <type_traits>
 #include <vector>
 
+#include "linkwise/bodies/beam.hpp"
 #include "linkwise/bodies/own_coordinates.hpp"
 #include "linkwise/bodies/rigid.hpp"
 
@@ -22,6 +24,8 @@ concept BodyPorts = requires(const B& body, const RigidBody<double>& link, const
                              ArticulatedInertia<double>& Y, const Compliance<double>& inboard,
                              const Matrix6<double>& from_inboard) {
   { B::name } -> std::convertible_to<const char*>;
+  // What is wrong with finite parameters of the right number, and the remedy; or "".
+  { B::fault(std::span<const double>()) } -> std::same_as<std::string>;
   { B::make(link, std::span<const double>()) } -> std::same_as<B>;
   { mass(body) } -> std::same_as<double>;
   { inertia_times(body, v) } -> std::same_as<Force<double>>;
@@ -35,14 +39,11 @@ concept BodyPorts = requires(const B& body, const RigidBody<double>& link, const
   { compliance(body, inboard, X) } -> std::same_as<Matrix6<double>>;
   { compliance(body, from_inboard, X) } -> std::same_as<Matrix6<double>>;
   { moved(body, X) } -> std::same_as<B>;
-  // The pose of a joint starts from its placement, which is a constant of one-axis joints. What a
-  // port that moves on its body takes is in docs/extending.md.
-  requires B::ports_are_fixed;
   requires !has_coordinates<B> || AnswersForCoordinates<B>;
 };
 
 /// By number, the place of its line in the table.
-enum class BodyKind : std::uint8_t { rigid };
+enum class BodyKind : std::uint8_t { rigid, beam };
 
 template <class B>
 struct BodyTag {
@@ -54,8 +55,7 @@ struct BodyKindTable {
   static constexpr int size = sizeof...(Kinds);
   static constexpr const char* names[] = {Kinds::name...};
   static constexpr int n_parameters[] = {Kinds::n_parameters...};
-  static constexpr int n_coordinates[] = {Kinds::n_coordinates...};
-  static constexpr bool any_coordinates = (has_coordinates<Kinds> || ...);
+  static constexpr bool with_coordinates[] = {Kinds::with_coordinates...};
   /// Bodies by kind.
   using Bodies = std::tuple<std::vector<Kinds>...>;
 
@@ -79,8 +79,9 @@ struct BodyKindTable {
 
 /// Rigid first. The order is that of stored models.
 using BodyKinds = BodyKindTable<  //
-    RigidBody<double>>;
+    RigidBody<double>, Beam>;
 static_assert(BodyKinds::kind_of<RigidBody<double>>() == BodyKind::rigid);
+static_assert(BodyKinds::kind_of<Beam>() == BodyKind::beam);
 
 inline const char* body_kind_name(BodyKind kind) {
   return BodyKinds::names[static_cast<int>(kind)];

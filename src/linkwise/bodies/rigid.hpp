@@ -7,6 +7,7 @@
 // of the joint that meets it says where it is. Gravity is the acceleration -g of the ground, so no
 // function is needed for the body's weight.
 #include <span>
+#include <string>
 
 #include "linkwise/spatial/composite.hpp"
 #include "linkwise/spatial/matrix6.hpp"
@@ -17,9 +18,9 @@ template <class C>
 struct RigidBody {
   static constexpr const char* name = "rigid";
   static constexpr int n_parameters = 0;
-  static constexpr int n_coordinates = 0;  ///< of its own (own_coordinates.hpp)
-  static constexpr bool ports_are_fixed = true;
+  static constexpr bool with_coordinates = false;  ///< of its own (own_coordinates.hpp)
 
+  static std::string fault(std::span<const double>) { return ""; }
   /// A link as a body of this kind, in the link's frame.
   static RigidBody make(const RigidBody& link, std::span<const double>) { return link; }
 

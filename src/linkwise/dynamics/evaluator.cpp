@@ -454,11 +454,34 @@ EvaluationReport Evaluator::reduce(size_t count, const double* q, DrivenInverse&
   return evaluation_report(m, {"articulated_body", "", ""}, report);
 }
 
+/// Of a machine with elastic links: a column is what one acceleration takes, at rest and without
+/// gravity.
+void mass_matrix_by_columns(const Model& m, const double* q, double* H) {
+  InverseDynamics<double> dynamics(m);
+  SweepInput<double> in;
+  in.q = q;
+  in.gravity_factor = 0;
+  std::vector<double> du(m.nv(), 0.0), tau(m.nv());
+  for (int k = 0; k < m.nv(); ++k) {
+    du[k] = 1;
+    dynamics.evaluate(in, du.data(), tau.data(), nullptr);
+    for (int i = 0; i < m.nv(); ++i) H[i * m.nv() + k] = tau[i];
+    du[k] = 0;
+  }
+}
+
 void Evaluator::mass_matrix(size_t count, const double* q, const Executor& executor, double* H,
                             const GoOn& go_on) const {
   const Model& m = *model_;
-  require_known_bodies(m, find_dynamics("composite_rigid_body"));
   const size_t nv = m.nv();
+  if (!m.own_element.empty()) {
+    refuse_loops(m, "the mass matrix of a machine with elastic links");
+    return for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
+      for (size_t i = first; i < first + n; ++i)
+        mass_matrix_by_columns(m, q + i * m.nq(), H + i * nv * nv);
+    });
+  }
+  require_known_bodies(m, find_dynamics("composite_rigid_body"));
   for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
     Lease workspace(*this);
     if (!workspace->composite) {

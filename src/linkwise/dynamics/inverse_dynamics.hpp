@@ -52,6 +52,9 @@ class InverseDynamics {
       const BodyConstants<double>& k = model.constants[n];
       Motion<S> a = state_[n].X * a_parent;
       a += state_[n].c;
+      if constexpr (is_general<J>)
+        if (du && on_port(model, body))
+          add_port_rates(in, model.elements[body.first_element], du, a);
       if constexpr (!is_general<J>)
         J::add_rate(a, k.pitch, du ? du[body.v] : S{});
       else if (du)
@@ -59,15 +62,22 @@ class InverseDynamics {
       a_[n] = a;
       w_[n] = {};
       if constexpr (has_coordinates<std::remove_cvref_t<decltype(own)>>) {
-        const int first = model.elements[model.own_element[n]].v;
-        add_own_load(own, state_[n].v, own_state(model, in, n), a, du ? du + first : nullptr, w_[n],
+        const int first = own_place(model, n);
+        OwnEquationsHere<S> blocks;
+        calc_equations(own, state_[n].v, own_state(model, in, n), blocks);
+        blocks.p = state_[n].bias;  // with external wrenches
+        add_own_load(own.n_coordinates(), blocks, a, du ? du + first : nullptr, w_[n],
                      tau ? tau + first : nullptr);
-        w_[n] += state_[n].bias;
       } else {
         inward_load(own, a, state_[n].bias, w_[n]);
       }
     };
     sweep_bodies_outward(model, model.kind_ranges, ground, acceleration_of, step);
+  }
+
+  /// What the coordinates of an elastic body give to what its port carries.
+  static void add_port_rates(const SweepInput<S>& in, const Element& e, const S* du, Motion<S>& a) {
+    for_columns(e, in.q, [&](int k, const Motion<S>& column) { a += du[e.v + k] * column; });
   }
 
   void tip_to_base(const SweepInput<S>& in, S* tau) {

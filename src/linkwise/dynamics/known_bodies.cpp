@@ -9,7 +9,7 @@ namespace {
 bool takes(const DynamicsEntry& method, BodyKind kind) {
   if (kind == BodyKind::rigid) return true;
   return method.any_body &&
-         (method.own_coordinates || BodyKinds::n_coordinates[static_cast<int>(kind)] == 0);
+         (method.own_coordinates || !BodyKinds::with_coordinates[static_cast<int>(kind)]);
 }
 
 }  // namespace

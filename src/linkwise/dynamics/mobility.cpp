@@ -43,6 +43,7 @@ double let_move(const EliminatedAxis<double>& axis, const Motion<double>& P, Mat
 Mobility::Mobility(const Model& model)
     : model_(&model),
       columns_(model),
+      own_(model),
       axis_(columns_.count()),
       Y_(model.n_bodies()),
       W_(model.n_bodies()),
@@ -53,7 +54,7 @@ std::span<const double> Mobility::evaluate(const double* q) {
   in.q = q;
   columns_.update(in);
   if (!tip_to_base(in)) return {};
-  base_to_tip(in);
+  base_to_tip();
   return diagonal_;
 }
 
@@ -61,10 +62,19 @@ bool Mobility::tip_to_base(const SweepInput<double>& in) {
   const Model& model = *model_;
   const std::vector<double>& armature = model.dof_values(DofProperty::armature);
   std::fill(Y_.begin(), Y_.end(), ArticulatedInertia<double>{});
+  for (int n = 0; n < model.n_bodies(); ++n) {
+    BodyState<double> state;
+    if (own_.has(n)) own_.update(in, n, {});
+    if (on_port(model, model.topology[n])) own_.update_port(in, n, {}, state);
+  }
   for (int n = model.n_bodies() - 1; n >= 0; --n) {
     ArticulatedInertia<double>& Y = Y_[n];
-    with_body(model, n,
-              [&](const auto& body) { add_condensed(Y, body, model, in, n, Motion<double>{}); });
+    Force<double> none;
+    if (own_.has(n)) {
+      if (!own_.eliminate(in, n, Y, none)) return false;
+    } else {
+      with_body(model, n, [&](const auto& body) { add_inertia(Y, body); });
+    }
     for (int k = columns_.first(n + 1) - 1; k >= columns_.first(n); --k) {
       const double D = eliminate<ColumnJoint>(Y, Force<double>{}, columns_.P(k),
                                               armature[columns_.dof(k)], 0.0, axis_[k]);
@@ -73,42 +83,71 @@ bool Mobility::tip_to_base(const SweepInput<double>& in) {
     }
     const int parent = model.topology[n].parent;
     if (parent >= 0) Y_[parent] += transform_to_parent(columns_.state(n).X, Y);
+    if (on_port(model, model.topology[n])) own_.receive(n, columns_.state(n).X, Y, Force<double>{});
   }
   return true;
 }
 
-/// What each coordinate of body n's own yields to its force, where W is what the body does.
-void Mobility::own_coordinates(const SweepInput<double>& in, int n, const Matrix6<double>& W) {
-  where_coordinates(*model_, in, n, [&](const auto& body, OwnState<double> inside) {
-    constexpr int count = std::remove_cvref_t<decltype(body)>::n_coordinates;
-    const Motion<double> none{};
-    double tau[count]{}, rest[count], rate[count];
-    inside.tau = tau;
-    const Force<double> p = condense(body, none, inside).p;
-    accelerate_own(body, none, inside, none, rest);
-    for (int k = 0; k < count; ++k) {
-      tau[k] = 1;
-      Force<double> less = p;
-      less -= condense(body, none, inside).p;
-      Vector6<double> a{};
-      for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) a[i] += W[6 * i + j] * to_array(less)[j];
-      accelerate_own(body, none, inside, to_motion(a.data()), rate);
-      diagonal_[model_->elements[model_->own_element[n]].v + k] = rate[k] - rest[k];
-      tau[k] = 0;
+/// Of body n on a port, by what its parent W_p does: Z W_p Z^T + P m_e^-1 P^T with
+/// Z = X - P m_e^-1 M_e^T, the acceleration of the port where that of the parent's frame is one.
+Matrix6<double> Mobility::of_port(int n) const {
+  const int parent = model_->topology[n].parent, count = own_.count(parent);
+  const OwnEquations<double>& of = own_.blocks(parent);
+  const ElasticPort<double>& port = own_.port(parent);
+  const Transform<double>& X = columns_.state(n).X;
+  Vector6<double> Z[6], sum[most_coordinates] = {};  // columns of Z; P m_e^-1
+  for (int k = 0; k < count; ++k) {
+    double unit[most_coordinates] = {};
+    unit[k] = 1;
+    cholesky_solve(count, of.m_e, unit);
+    for (int l = 0; l < count; ++l) {
+      const Vector6<double> P = to_array(port.P[l]);
+      for (int i = 0; i < 6; ++i) sum[k][i] += unit[l] * P[i];
     }
-  });
+  }
+  for (int j = 0; j < 6; ++j) {
+    double unit[6] = {};
+    unit[j] = 1;
+    const Motion<double> along = to_motion(unit);
+    Z[j] = to_array(X * along);
+    for (int k = 0; k < count; ++k)
+      for (int i = 0; i < 6; ++i) Z[j][i] -= sum[k][i] * dot(along, of.M_e[k]);
+  }
+  Matrix6<double> W{};
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) {
+      for (int k = 0; k < 6; ++k)
+        for (int l = 0; l < 6; ++l) W[6 * i + j] += Z[k][i] * W_[parent][6 * k + l] * Z[l][j];
+      for (int k = 0; k < count; ++k) W[6 * i + j] += sum[k][i] * to_array(port.P[k])[j];
+    }
+  return W;
 }
 
-void Mobility::base_to_tip(const SweepInput<double>& in) {
+/// What each coordinate of body n's own yields to its force: m_e^-1 + m_e^-1 M_e^T W M_e m_e^-1.
+void Mobility::own_coordinates(int n) {
+  const int count = own_.count(n);
+  const OwnEquations<double>& of = own_.blocks(n);
+  for (int k = 0; k < count; ++k) {
+    double unit[most_coordinates] = {};
+    unit[k] = 1;
+    cholesky_solve(count, of.m_e, unit);
+    Force<double> wrench;
+    for (int l = 0; l < count; ++l) wrench += unit[l] * of.M_e[l];
+    diagonal_[own_place(*model_, n) + k] = unit[k] + dot(W_[n] * wrench, wrench);
+  }
+}
+
+void Mobility::base_to_tip() {
   const Model& model = *model_;
   for (int n = 0; n < model.n_bodies(); ++n) {
     Matrix6<double>& W = W_[n];
     const int parent = model.topology[n].parent;
-    W = parent >= 0 ? transform_to_child(columns_.state(n).X, W_[parent]) : Matrix6<double>{};
+    W = parent < 0                          ? Matrix6<double>{}
+        : on_port(model, model.topology[n]) ? of_port(n)
+                                            : transform_to_child(columns_.state(n).X, W_[parent]);
     for (int k = columns_.first(n); k < columns_.first(n + 1); ++k)
       diagonal_[columns_.dof(k)] = let_move(axis_[k], columns_.P(k), W);
-    own_coordinates(in, n, W);
+    if (own_.has(n)) own_coordinates(n);
   }
 }
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "linkwise/kinematics/body_columns.hpp"
-#include "linkwise/kinematics/own_states.hpp"
+#include "linkwise/recursion/own_bodies.hpp"
 #include "linkwise/recursion/stack_steps.hpp"
 
 namespace linkwise {
@@ -26,11 +26,13 @@ class Mobility {
 
  private:
   bool tip_to_base(const SweepInput<double>& in);
-  void base_to_tip(const SweepInput<double>& in);
-  void own_coordinates(const SweepInput<double>& in, int n, const Matrix6<double>& W);
+  void base_to_tip();
+  Matrix6<double> of_port(int n) const;
+  void own_coordinates(int n);
 
   const Model* model_;
   BodyColumns columns_;
+  OwnBodies<double> own_;
   std::vector<EliminatedAxis<double>> axis_;
   std::vector<ArticulatedInertia<double>> Y_;
   std::vector<Matrix6<double>> W_;

@@ -141,6 +141,8 @@ void check_drive(const Model& model, const JointInfo& joint, const Drive& drive)
   const std::string head = "joint '" + joint.name + "'" + model.where() + ": ";
   if (joint.nv == 0)
     throw InputError(head + "a fixed joint or rod has no coordinate to drive; drive another joint");
+  if (joint.type == JointType::elastic)
+    throw InputError(head + "is elastic, and its coordinates have no drive; drive another joint");
   if ((is_pd || is_motion) && joint.nq != joint.nv)
     throw InputError(head + "a " + (is_motion ? "motion" : "pd") +
                      " drive needs angles or distances, not a quaternion; drive it by torque");

@@ -44,7 +44,7 @@ void add_forces(const Joints& joints, const double* q, const double* v, double* 
   }
   for (const Element& e : joints.elements) {
     if (!has_scalar_coordinates(e)) continue;
-    double rate[3], force[3];
+    double rate[most_coordinates], force[most_coordinates];
     scalar_rates(e, q, v, rate);
     for (int k = 0; k < e.nv; ++k) {
       const int i = e.v + k;

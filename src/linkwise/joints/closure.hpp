@@ -76,6 +76,7 @@ inline void one_element(const Element& e, const Transform<double>& X_FE, double*
   switch (e.kind) {
     case ElementKind::fixed:
     case ElementKind::own:
+    case ElementKind::elastic:
       break;
     case ElementKind::revolute:
       own[0] = nearest_turn(turn_of(X.R), own[0]);

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "linkwise/joints/axis_joints.hpp"
+#include "linkwise/spatial/elastic_port.hpp"
 
 namespace linkwise {
 
@@ -18,7 +19,8 @@ enum class ElementKind : std::uint8_t {
   spherical,
   planar,
   floating,
-  own  ///< no motion of a joint: a coordinate of a body's own
+  own,     ///< no motion of a joint: a coordinate of a body's own
+  elastic  ///< on the port of an elastic body, whose coordinates move it
 };
 
 /// What a kind has.
@@ -38,6 +40,7 @@ inline constexpr ElementKindInfo element_kind_table[] = {
     {3, 3, -1, 2, "normal", "m m rad", "m m rad"},                // planar
     {7, 6, 3, 3, nullptr, "m m m 1 1 1 1", "m m m rad rad rad"},  // floating
     {1, 1, -1, 0, nullptr, "1", "1"},                             // own
+    {0, 0, -1, 0, nullptr, "", ""},                               // elastic: as the body has
 };
 constexpr const ElementKindInfo& info_of(ElementKind kind) {
   return element_kind_table[static_cast<int>(kind)];
@@ -60,6 +63,9 @@ struct Element {
   int joint = 0;  ///< the user's joint it belongs to
   double pitch = 0;
   Transform<double> placement;  ///< previous frame -> this frame at zero
+  /// Of an elastic one; the body, which the model keeps, owns it. Its placement leads to the frame
+  /// that the shape starts from.
+  const ElasticShape* shape = nullptr;
 };
 
 /// Rotation (child axes in parent components)^T of a quaternion x, y, z, w of any nonzero length.
@@ -111,6 +117,8 @@ LW_INLINE Transform<S> element_pose(const Element& e, const S* q) {
     }
     case ElementKind::floating:
       return Transform<S>{rotation_to_child(own + 3), {own[0], own[1], own[2]}} * e.placement;
+    case ElementKind::elastic:
+      return elastic_pose(*e.shape, own) * e.placement;
     case ElementKind::fixed:
     case ElementKind::own:
       break;
@@ -118,7 +126,8 @@ LW_INLINE Transform<S> element_pose(const Element& e, const S* q) {
   return PrismaticJoint::pose(e.placement, 0.0, S{});
 }
 
-/// Column k of the motion subspace in the element's own frame.
+/// Column k of the motion subspace in the element's own frame, for all kinds but the elastic one,
+/// whose columns depend on its coordinates.
 template <class S>
 LW_INLINE Motion<S> element_column(const Element& e, int k) {
   Motion<S> column;
@@ -137,6 +146,18 @@ LW_INLINE Motion<S> element_column(const Element& e, int k) {
   *parts[component] = one;
   if (e.kind == ElementKind::helical) column.lin.z = broadcast<S>(e.pitch);
   return column;
+}
+
+/// f(k, column k) of an element of any kind, in its own frame.
+template <class S, class F>
+LW_INLINE void for_columns(const Element& e, const S* q, F&& f) {
+  if (e.kind == ElementKind::elastic) {
+    ElasticPort<S> port;
+    calc_elastic_port(*e.shape, q + e.q, port);
+    for (int k = 0; k < e.nv; ++k) f(k, port.P[k]);
+  } else {
+    for (int k = 0; k < e.nv; ++k) f(k, element_column<S>(e, k));
+  }
 }
 
 /// dq/dt of one element from its rates. Quaternions keep whatever length they have.
@@ -174,7 +195,7 @@ inline void element_position_rate(const Element& e, const double* q, const doubl
       break;
     }
     default:
-      rate[0] = u[0];
+      for (int k = 0; k < e.nv; ++k) rate[k] = u[k];
   }
 }
 

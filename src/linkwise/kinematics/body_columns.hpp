@@ -18,7 +18,7 @@ class BodyColumns {
       const BodyTopology& body = model.topology[n];
       for (int i = 0; i < body.n_elements; ++i) {
         const Element& e = model.elements[body.first_element + i];
-        if (!e.prescribed) count_ += e.nv;
+        if (!e.prescribed && e.kind != ElementKind::elastic) count_ += e.nv;
       }
     }
     first_.push_back(count_);

@@ -22,7 +22,8 @@ struct BodyState {
 };
 
 /// Motion subspace of a body whose joint is not one plain axis. Prescribed elements are no columns:
-/// their given acceleration is part of c.
+/// their given acceleration is part of c. Nor are elastic ones: their coordinates are another
+/// body's.
 template <class S>
 struct GeneralState {
   int n = 0;   ///< free degrees of freedom
@@ -34,6 +35,18 @@ struct GeneralState {
 inline bool is_free(const Model& model, const BodyTopology& body) {
   const Element& e = model.elements[body.first_element];
   return body.n_elements == 1 && e.kind == ElementKind::floating && !e.prescribed;
+}
+
+/// The elastic element that a body's joint starts with: v and c take its motion.
+template <class S>
+LW_INLINE void carry_on_port(const Element& e, const SweepInput<S>& in, const ElasticPort<S>& port,
+                             Motion<S>& v, Motion<S>& c) {
+  if (!in.v) return;
+  Motion<S> relative{};
+  for (int k = 0; k < e.nv; ++k) relative += in.v[e.v + k] * port.P[k];
+  v += relative;
+  c += cross(v, relative);
+  c += elastic_column_rate(*e.shape, port, in.q + e.q, in.v + e.v, relative);
 }
 
 /// Walks a stack of elements outward from a frame that moves by v_parent.
@@ -48,6 +61,12 @@ void calc_general_state(std::span<const Element> stack, const SweepInput<S>& in,
     for (int k = 0; k < general.n; ++k) general.P[k] = X * general.P[k];
     v = X * v;
     c = X * c;
+    if (e.kind == ElementKind::elastic) {
+      ElasticPort<S> port;
+      calc_elastic_port(*e.shape, in.q + e.q, port);
+      carry_on_port(e, in, port, v, c);
+      continue;
+    }
     Motion<S> relative{};
     for (int k = 0; k < e.nv; ++k) {
       const Motion<S> column = element_column<S>(e, k);

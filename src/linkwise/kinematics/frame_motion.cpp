@@ -36,11 +36,15 @@ FrameMotion frame_motion(const Model& model, const double* q, const double* v, c
   for (auto e = path.rbegin(); e != path.rend(); ++e) {
     const Element& element = **e;
     const Transform<double> X = element_pose(element, q);
-    Motion<double> own{}, change{};  // P u, constant columns P, and P du
-    for (int k = 0; k < element.nv; ++k) {
-      const auto column = element_column<double>(element, k);
+    Motion<double> own{}, change{};  // P u, and P du + dP u
+    for_columns(element, q, [&](int k, const Motion<double>& column) {
       if (v) own += v[element.v + k] * column;
       if (du) change += du[element.v + k] * column;
+    });
+    if (v && element.kind == ElementKind::elastic) {
+      ElasticPort<double> port;
+      calc_elastic_port(*element.shape, q + element.q, port);
+      change += elastic_column_rate(*element.shape, port, q + element.q, v + element.v, own);
     }
     at.pose = X * at.pose;
     at.velocity = X * at.velocity;
@@ -66,7 +70,7 @@ void frame_jacobian(const Model& model, const double* q, const FramePlacement& f
   };
   Transform<double> X = from_last_element(model, frame);
   for (const Element* e : path) {
-    for (int k = 0; k < e->nv; ++k) store(e->v + k, X * element_column<double>(*e, k));
+    for_columns(*e, q, [&](int k, const Motion<double>& column) { store(e->v + k, X * column); });
     X = X * element_pose(*e, q);
   }
   if (!world_axes) return;

@@ -35,13 +35,19 @@ template <class J>
 inline constexpr bool is_general = std::is_same_v<J, GeneralJoint>;
 
 /// Calls f(joint, bodies, begin, end), where bodies[n] is a body of a kind known while compiling.
+/// Bodies that are not rigid are on general joints, whatever these are: every pair of kinds would
+/// have to be compiled otherwise, and their own work hides what a joint of its own would spare.
 template <class F>
 LW_INLINE void dispatch_bodies(const Model& model, const KindRange& range, F&& f) {
-  dispatch_kind_range(range, [&](auto joint, int begin, int end) {
-    BodyKinds::dispatch(range.body_kind, [&](auto kind) {
-      f(joint, BodiesOfKind<typename decltype(kind)::Body>{model}, begin, end);
+  if (range.body_kind == BodyKind::rigid) {
+    dispatch_kind_range(range, [&](auto joint, int begin, int end) {
+      f(joint, BodiesOfKind<RigidBody<double>>{model}, begin, end);
     });
-  });
+  } else {
+    BodyKinds::dispatch<1>(range.body_kind, [&](auto kind) {
+      f(GeneralJoint{}, BodiesOfKind<typename decltype(kind)::Body>{model}, range.begin, range.end);
+    });
+  }
 }
 
 /// f(joint, n) for the bodies of some ranges; with the model at hand f(joint, n, body n).

@@ -13,6 +13,9 @@ LW_INLINE OwnState<S> own_state(const Model& model, const SweepInput<S>& in, int
   return {in.q + first.q, in.v ? in.v + first.v : nullptr, in.tau ? in.tau + first.v : nullptr};
 }
 
+/// Place of the first coordinate of body n's own in v.
+inline int own_place(const Model& model, int n) { return model.elements[model.own_element[n]].v; }
+
 /// f(body), with the body's own state behind it where its kind has one.
 template <class B, class S, class F>
 LW_INLINE decltype(auto) with_own_state(const B& body, const Model& model, const SweepInput<S>& in,
@@ -26,31 +29,16 @@ LW_INLINE decltype(auto) with_own_state(const B& body, const Model& model, const
 /// f(body n, its own state) where its kind has one; nothing otherwise.
 template <class S, class F>
 LW_INLINE void where_coordinates(const Model& model, const SweepInput<S>& in, int n, F&& f) {
-  if constexpr (BodyKinds::any_coordinates)
-    with_body(model, n, [&](const auto& body) {
-      if constexpr (has_coordinates<std::remove_cvref_t<decltype(body)>>)
-        f(body, own_state(model, in, n));
-    });
+  if (model.own_element.empty() || model.own_element[n] < 0) return;
+  with_body(model, n, [&](const auto& body) {
+    if constexpr (has_coordinates<std::remove_cvref_t<decltype(body)>>)
+      f(body, own_state(model, in, n));
+  });
 }
 
-/// The wrench that body n takes without acceleration of its frame, its coordinates eliminated.
-template <class B, class S>
-LW_INLINE Force<S> condensed_bias(const B& body, const Model& model, const SweepInput<S>& in, int n,
-                                  const Motion<S>& v) {
-  if constexpr (has_coordinates<B>)
-    return condense(body, v, own_state(model, in, n)).p;
-  else
-    return momentum_bias(body, v);
-}
-
-/// Adds what an acceleration of its frame takes then.
-template <class B, class S>
-LW_INLINE void add_condensed(ArticulatedInertia<S>& Y, const B& body, const Model& model,
-                             const SweepInput<S>& in, int n, const Motion<S>& v) {
-  if constexpr (has_coordinates<B>)
-    Y += condense(body, v, own_state(model, in, n)).M;
-  else
-    add_inertia(Y, body);
+/// Does a body's joint carry it on an elastic body's port?
+inline bool on_port(const Model& model, const BodyTopology& body) {
+  return model.elements[body.first_element].kind == ElementKind::elastic;
 }
 
 }  // namespace linkwise

@@ -164,6 +164,8 @@ void ModelBuilder::set_floating_base(std::string joint_name) {
 ModelSpec ModelBuilder::spec(bool keep_fixed) const {
   ModelSpec spec = spec_;
   spec.keep_fixed = keep_fixed;
+  for (const FlexibleLink& flexible : flexible_)
+    spec = with_flexible_link(std::move(spec), flexible);
   return spec;
 }
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "linkwise/model/spec.hpp"
+#include "linkwise/model/flexible_link.hpp"
 
 namespace linkwise {
 
@@ -46,6 +46,9 @@ class ModelBuilder {
   void add_spring(LoopJointSpec loop, double length, Properties properties);
   void add_coupling(CouplingSpec coupling) { spec_.couplings.push_back(std::move(coupling)); }
 
+  /// Once all joints are there: spec() does it. Throws then as with_flexible_link.
+  void make_flexible(FlexibleLink flexible) { flexible_.push_back(std::move(flexible)); }
+
   /// level: "merge", "warning" or "info".
   void add_note(const std::string& level, std::string element, std::string text);
   void set_floating_base(std::string joint_name);
@@ -58,6 +61,7 @@ class ModelBuilder {
                 Properties properties) const;
 
   ModelSpec spec_;
+  std::vector<FlexibleLink> flexible_;
 };
 
 /// Links that are all the same, in a row.

@@ -32,6 +32,7 @@ const JointTypeInfo joint_type_table[n_joint_types] = {
     {JointType::planar, "planar", 1, 1, {{planar, 0}}, "x y angle", "vx vy wz"},
     {JointType::floating, "floating", 0, 1, {{floating}}, "x y z qx qy qz qw", "vx vy vz wx wy wz"},
     {JointType::composite, "composite", -1, -1, {}, "1 2 3 4 5 6", "1 2 3 4 5 6"},
+    {JointType::elastic, "elastic", 0, 1, {{elastic}}, "", ""},
 };
 
 namespace {
@@ -43,8 +44,21 @@ std::vector<std::string> words(const char* text) {
   return out;
 }
 
+/// Of a beam (bodies/beam.hpp): how far it stretches, where it does; twist; deflections.
+std::vector<ScalarLabel> elastic_labels(int n) {
+  std::vector<ScalarLabel> out;
+  const bool stretches = n % 2 == 0;
+  const int in_plane = (n - 1 - stretches) / 2;
+  if (stretches) out.push_back({"stretch", "m"});
+  out.push_back({"twist", "rad"});
+  for (const char* plane : {"y", "z"})
+    for (int k = 1; k <= in_plane; ++k) out.push_back({plane + std::to_string(k), "m"});
+  return out;
+}
+
 std::vector<ScalarLabel> labels(const JointSpec& joint, const char* suffixes,
                                 const char* ElementKindInfo::*units) {
+  if (joint.type == JointType::elastic) return elastic_labels(joint.n_coordinates);
   std::vector<ScalarLabel> out;
   for (int k = 0; k < n_joint_elements(joint); ++k)
     for (const std::string& unit : words(info_of(joint_element(joint, k).kind).*units))
@@ -73,8 +87,14 @@ JointElement joint_element(const JointSpec& joint, int k) {
 
 int joint_dof(const JointSpec& joint) {
   int dof = 0;
-  for (int k = 0; k < n_joint_elements(joint); ++k) dof += info_of(joint_element(joint, k).kind).nv;
+  for (int k = 0; k < n_joint_elements(joint); ++k) dof += element_size(joint, k).nv;
   return dof;
+}
+
+ElementSize element_size(const JointSpec& joint, int k) {
+  const ElementKind kind = joint_element(joint, k).kind;
+  if (kind == elastic) return {joint.n_coordinates, joint.n_coordinates};
+  return {info_of(kind).nq, info_of(kind).nv};
 }
 
 JointType joint_type_from_name(const std::string& name) {

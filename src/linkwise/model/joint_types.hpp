@@ -37,6 +37,11 @@ inline const char* axis_kind_name(AxisKind kind) { return info_of(element_kind(k
 /// Element k of a joint, inboard first.
 JointElement joint_element(const JointSpec& joint, int k);
 int n_joint_elements(const JointSpec& joint);
+/// Coordinates and rates of that element.
+struct ElementSize {
+  int nq, nv;
+};
+ElementSize element_size(const JointSpec& joint, int k);
 /// Degrees of freedom.
 int joint_dof(const JointSpec& joint);
 /// Throws InputError with the names that are known.

@@ -42,15 +42,6 @@ void check_inertia(const Machine& machine, int l, bool welded, const Inertia<dou
                    " kg m2); give a positive semidefinite inertia about the centre of mass");
 }
 
-/// Only rigid bodies become one by a weld.
-void check_weld(const Machine& machine, int lead, int child, const std::string& joint) {
-  for (const int l : {lead, child})
-    if (const LinkSpec& link = machine.spec.links[l]; link.body_kind != BodyKind::rigid)
-      throw InputError("link '" + link.name + "'" + machine.where + " is of kind " +
-                       body_kind_name(link.body_kind) + ", and joint '" + joint +
-                       "' welds it to another link; keep fixed joints, or let the joint move");
-}
-
 /// A lump without mass that is a body carries several joints, or a stack of six degrees of freedom.
 /// What hangs on a light one is find_undetermined's business. No warning: loads are right, and the
 /// method that cannot take it refuses it.
@@ -90,7 +81,6 @@ LumpedInertia lump_inertia(const Machine& machine, const Lumps& lumps, std::vect
     const JointSpec& s = machine.joint(j);
     const int parent = machine.graph.joints[j].parent, child = machine.graph.joints[j].child;
     const int lead = lumps.lead[child];
-    check_weld(machine, lead, child, s.name);
     out.from_lead[child] =
         Transform<double>{transpose(s.rotation), s.translation} * out.from_lead[parent];
     out.inertia[lead] += transform_to_parent(out.from_lead[child], about_origin(spec.links[child]));

@@ -143,8 +143,13 @@ Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::s
       const LoopKind kind = spec.loop_joints[i - spec.joints.size()].kind;
       dof = kind == LoopKind::spring ? 6 : kind == LoopKind::rod ? 5 : dof;
     }
-    graph.joints.push_back({parent, child, dof, acts(j), !closes && j.type == JointType::fixed,
-                            closes, j.type == JointType::composite});
+    // Only rigid bodies become one by a weld.
+    const auto rigid = [&](int l) { return spec.links[l].body_kind == BodyKind::rigid; };
+    const bool weld = !closes && j.type == JointType::fixed && rigid(parent) && rigid(child);
+    graph.joints.push_back(
+        {parent, child, dof, acts(j), weld, closes, j.type == JointType::composite});
+    // The body behind an elastic joint moves with mass, that of the elastic body.
+    if (j.type == JointType::elastic) graph.massless[child] = 0;
   }
   if (spec.keep_fixed) {
     const std::vector<char> carries = links_that_carry(graph);
@@ -158,6 +163,10 @@ Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::s
         loop >= 0 && spec.loop_joints[loop].kind != LoopKind::joint)
       throw InputError("joint '" + name + "'" + where +
                        " is a rod or a spring, whose motion cannot be given; give that of a joint");
+    if (j >= 0 && machine.joint(j).type == JointType::elastic)
+      throw InputError("joint '" + name + "'" + where +
+                       " is elastic, and its motion cannot be given; give that of a joint that is "
+                       "not");
     if (j >= 0 || (spec.floating_base && name == spec.floating_joint))
       machine.prescribed[j >= 0 ? j : n_joints] = 1;
   }

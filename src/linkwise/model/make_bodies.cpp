@@ -1,5 +1,7 @@
 #include "linkwise/model/make_bodies.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "linkwise/base/error.hpp"
@@ -21,7 +23,8 @@ void classify(const PlacedJoints& placed, BodyTopology& body, BodyConstants<doub
   const Element& e = placed.elements[body.first_element];
   body.q = e.q;
   body.v = e.v;
-  if (e.prescribed || e.nv != 1) return;
+  if (e.prescribed || e.nv != 1 || e.kind == ElementKind::elastic) return;
+  if (body.body_kind != BodyKind::rigid) return;  // kinematics/kind_ranges.hpp
   constants.pitch = e.pitch;
   constants.armature = placed.dof[static_cast<int>(DofProperty::armature)][e.v];
   body.joint_kind = e.kind == ElementKind::prismatic ? JointKind::prismatic
@@ -30,10 +33,32 @@ void classify(const PlacedJoints& placed, BodyTopology& body, BodyConstants<doub
                                                      : JointKind::revolute;
 }
 
+/// The last body of each kind, before it was moved: one that is made of the same numbers shares
+/// what it keeps.
+struct LastMade {
+  BodyKinds::Bodies bodies;
+  const std::vector<double>* parameters[BodyKinds::size] = {};
+};
+
+template <class B>
+B make_body(const LinkSpec& link, const Inertia<double>& inertia, LastMade& last) {
+  const RigidBody<double> rigid{inertia};
+  if constexpr (!has_coordinates<B>) {
+    return B::make(rigid, link.parameters);
+  } else {
+    auto& bodies = std::get<std::vector<B>>(last.bodies);
+    auto*& parameters = last.parameters[static_cast<int>(link.body_kind)];
+    if (!parameters || *parameters != link.parameters)
+      bodies.assign(1, B::make(rigid, link.parameters));
+    parameters = &link.parameters;
+    return bodies.front();
+  }
+}
+
 /// Body b from its link and the inertia of all that is welded to it. X takes the body frame to the
 /// link's.
 void set_body(const LinkSpec& link, const Inertia<double>& inertia, const Transform<double>& X,
-              Bodies& out, int b) {
+              LastMade& last, Bodies& out, int b) {
   BodyTopology& at = out.topology[b];
   at.body_kind = link.body_kind;
   BodyKinds::dispatch(at.body_kind, [&](auto kind) {
@@ -43,8 +68,7 @@ void set_body(const LinkSpec& link, const Inertia<double>& inertia, const Transf
       at.of_kind = static_cast<int>(bodies.size());
       bodies.emplace_back();
     }
-    body_of_kind<B>(at, out.constants[b], out.others) =
-        moved(B::make(RigidBody<double>{inertia}, link.parameters), X);
+    body_of_kind<B>(at, out.constants[b], out.others) = moved(make_body<B>(link, inertia, last), X);
   });
 }
 
@@ -53,7 +77,7 @@ template <class B>
 void place_coordinates(const B& body, int joint, PlacedJoints& placed, Bodies& out, int b) {
   if (out.own_element.empty()) out.own_element.assign(out.topology.size(), -1);
   out.own_element[b] = static_cast<int>(placed.elements.size());
-  for (int k = 0; k < B::n_coordinates; ++k) {
+  for (int k = 0; k < body.n_coordinates(); ++k) {
     Element element;
     element.kind = ElementKind::own;
     element.q = placed.nq++;
@@ -67,6 +91,45 @@ void place_coordinates(const B& body, int joint, PlacedJoints& placed, Bodies& o
   }
 }
 
+/// The elastic element of a joint on the port of body b, whose coordinates are the body's.
+template <class B>
+void place_port(const B& body, const Machine& machine, const JointInfo& joint, Element& element,
+                PlacedJoints& placed, Bodies& out, int b) {
+  if (out.own_element.empty()) out.own_element.assign(out.topology.size(), -1);
+  out.own_element[b] = joint.first_element;
+  element.shape = body.port();
+  const Transform<double> given = element.placement;
+  element.placement = body.to_port_base();
+  const Transform<double> straight =
+      Transform<double>{Mat3<double>::identity(), element.shape->rest} * element.placement;
+  const Vec3<double> gap = straight.r - given.r;
+  double off = std::sqrt(dot(gap, gap));
+  for (int i = 0; i < 9; ++i) off = std::max(off, std::abs(straight.R.m[i] - given.R.m[i]));
+  if (off > 1e-9 * (1 + std::sqrt(dot(straight.r, straight.r))))
+    throw InputError("joint '" + joint.name + "'" + machine.where +
+                     ": is not at the end of its elastic link, or not along its axes; place it "
+                     "there");
+  for (int k = 0; k < joint.nv; ++k) {
+    placed.dof[static_cast<int>(DofProperty::stiffness)][joint.v + k] = body.stiffness(k);
+    placed.dof[static_cast<int>(DofProperty::damping)][joint.v + k] = body.damping(k);
+  }
+}
+
+void place_ports(const Machine& machine, const BodyTree& tree, PlacedJoints& placed, Bodies& out) {
+  for (size_t c = 0; c < out.topology.size(); ++c) {
+    Element& element = placed.elements[out.topology[c].first_element];
+    if (element.kind != ElementKind::elastic) continue;
+    const int b = out.topology[c].parent;
+    const JointInfo& joint = placed.joints[joints_of(tree, static_cast<int>(c)).front()];
+    BodyKinds::dispatch(out.topology[b].body_kind, [&](auto kind) {
+      using B = typename decltype(kind)::Body;
+      if constexpr (has_coordinates<B>)
+        place_port(body_of_kind<B>(out.topology[b], out.constants[b], out.others), machine, joint,
+                   element, placed, out, b);
+    });
+  }
+}
+
 }  // namespace
 
 Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const BodyTree& tree,
@@ -75,6 +138,7 @@ Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const Bo
   Bodies out;
   out.topology.resize(n);
   out.constants.resize(n);
+  LastMade last;
   for (int b = 0; b < n; ++b) {
     const BodyTree::Body& given = tree.bodies[b];
     const std::span<const int> stack = joints_of(tree, b);
@@ -91,20 +155,22 @@ Bodies make_bodies(const Machine& machine, const LumpedInertia& lumped, const Bo
     }
     note_stack(machine, placed, stack, notes);
     set_body(machine.spec.links[given.link], lumped.inertia[given.link],
-             placed.joints[stack.back()].to_user, out, b);
+             placed.joints[stack.back()].to_user, last, out, b);
     constants.tree = placed.elements[body.first_element + body.n_elements - 1].placement;
     classify(placed, body, constants);
     if (body.joint_kind == JointKind::general) body.general = out.n_general++;
     if (out.singular < 0 && is_singular(lumped.inertia[given.link])) out.singular = b;
     if (body.parent >= 0) ++out.topology[body.parent].n_children;
   }
-  for (int b = 0; BodyKinds::any_coordinates && b < n; ++b)
+  for (int b = 0; b < n; ++b)
     BodyKinds::dispatch(out.topology[b].body_kind, [&](auto kind) {
       using B = typename decltype(kind)::Body;
-      if constexpr (has_coordinates<B>)
-        place_coordinates(body_of_kind<B>(out.topology[b], out.constants[b], out.others),
-                          joints_of(tree, b).back(), placed, out, b);
+      if constexpr (has_coordinates<B>) {
+        const B& body = body_of_kind<B>(out.topology[b], out.constants[b], out.others);
+        if (!body.port()) place_coordinates(body, joints_of(tree, b).back(), placed, out, b);
+      }
     });
+  place_ports(machine, tree, placed, out);
   return out;
 }
 

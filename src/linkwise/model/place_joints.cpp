@@ -26,10 +26,10 @@ Mat3<double> align_z(Vec3<double> a) {
 Xform append_elements(const JointSpec& joint, Element e, Xform to_joint,
                       std::vector<Element>& elements) {
   Xform to_user{Mat3<double>::identity(), {}};
-  const auto push = [&](ElementKind kind, const Mat3<double>& A, double pitch) {
+  const auto push = [&](int k, ElementKind kind, const Mat3<double>& A, double pitch) {
     e.kind = kind;
-    e.nq = info_of(kind).nq;
-    e.nv = info_of(kind).nv;
+    e.nq = element_size(joint, k).nq;
+    e.nv = element_size(joint, k).nv;
     e.pitch = pitch;
     e.placement = Xform{transpose(A), {}} * to_joint;
     elements.push_back(e);
@@ -41,9 +41,9 @@ Xform append_elements(const JointSpec& joint, Element e, Xform to_joint,
   for (int k = 0; k < n_joint_elements(joint); ++k) {
     const auto [kind, axis] = joint_element(joint, k);
     if (axis < 0)
-      push(kind, Mat3<double>::identity(), 0);
+      push(k, kind, Mat3<double>::identity(), 0);
     else
-      push(kind, align_z(joint.axes[axis].axis),
+      push(k, kind, align_z(joint.axes[axis].axis),
            kind == ElementKind::helical ? joint.axes[axis].pitch : 0);
   }
   return to_user;
@@ -66,8 +66,8 @@ PlacedJoints place_joints(const Machine& machine, const Lumps& lumps, const Lump
     info.q = out.nq;
     info.v = out.nv;
     for (int k = 0; k < n_joint_elements(s); ++k) {
-      info.nq += info_of(joint_element(s, k).kind).nq;
-      info.nv += info_of(joint_element(s, k).kind).nv;
+      info.nq += element_size(s, k).nq;
+      info.nv += element_size(s, k).nv;
     }
     append_dof_properties(s, machine.where, out.dof);
     out.nq += info.nq;

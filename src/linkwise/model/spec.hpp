@@ -23,8 +23,9 @@ enum class JointType {
   planar,
   floating,
   composite,
+  elastic,  ///< holds its child on the port of an elastic body, whose coordinates are its own
 };
-inline constexpr int n_joint_types = static_cast<int>(JointType::composite) + 1;
+inline constexpr int n_joint_types = static_cast<int>(JointType::elastic) + 1;
 
 /// One screw axis of a stack, in the joint frame.
 enum class AxisKind { revolute, prismatic, helical };
@@ -101,6 +102,7 @@ struct JointSpec {
   std::string name;
   JointType type = JointType::revolute;
   std::string parent, child;
+  int n_coordinates = 0;  ///< of an elastic joint, those of its parent; validate() finds them
   Mat3<double> rotation =
       Mat3<double>::identity();  ///< joint axes in the parent link frame (columns)
   Vec3<double> translation;      ///< joint point in the parent link frame, m

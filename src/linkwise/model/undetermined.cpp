@@ -13,6 +13,7 @@ constexpr size_t most_named = 20;
 
 /// Degrees of freedom without a rotor.
 int without_armature(const JointSpec& joint) {
+  if (joint.type == JointType::elastic) return 0;  // its body has mass for each of them
   const int all = joint_dof(joint);
   for (const DofValue& given : joint.dof) {
     if (given.property != DofProperty::armature) continue;

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <limits>
 #include <numbers>
+#include <unordered_map>
+#include <utility>
 
 #include "linkwise/base/error.hpp"
 #include "linkwise/model/joint_types.hpp"
@@ -20,7 +22,7 @@ bool finite(const Vec3<double>& v) {
 void validate_initial(JointSpec& joint, const std::string& head) {
   if (joint.initial.empty()) return;
   int nq = 0;
-  for (int k = 0; k < n_joint_elements(joint); ++k) nq += info_of(joint_element(joint, k).kind).nq;
+  for (int k = 0; k < n_joint_elements(joint); ++k) nq += element_size(joint, k).nq;
   if (joint.initial.size() != static_cast<size_t>(nq))
     throw InputError(head + "initial has " + std::to_string(joint.initial.size()) +
                      " numbers; give its " + std::to_string(nq) + " coordinates");
@@ -100,6 +102,55 @@ bool clearly_negative(double mass, const double principal[3]) {
   return principal[0] < -std::max(1e-6 * principal[2], 1e-12 * mass);
 }
 
+namespace {
+
+/// Of an elastic link that carries others on its port; 0: of no such link.
+int count_coordinates(const LinkSpec& link) {
+  return BodyKinds::dispatch(link.body_kind, [&](auto kind) {
+    using B = typename decltype(kind)::Body;
+    if constexpr (has_coordinates<B>) return B::port_coordinates(link.parameters);
+    return 0;
+  });
+}
+
+/// Elastic joints and elastic links belong to each other, one to one.
+void validate_ports(ModelSpec& spec, const std::string& where) {
+  std::unordered_map<std::string, int> coordinates;  // of elastic links, 0 once one has its joint
+  for (const LinkSpec& link : spec.links)
+    if (const int n = count_coordinates(link)) coordinates[link.name] = n;
+  for (JointSpec& joint : spec.joints) {
+    const auto parent = coordinates.find(joint.parent);
+    const bool on_elastic = parent != coordinates.end();
+    const std::string head = "joint '" + joint.name + "'" + where + ": ";
+    if (joint.type != JointType::elastic) {
+      if (on_elastic)
+        throw InputError(head + "link '" + joint.parent +
+                         "' is elastic; let the joint hang on the link at its end");
+      continue;
+    }
+    if (!on_elastic)
+      throw InputError(head + "is elastic, but link '" + joint.parent +
+                       "' is rigid; make that link flexible, or the joint fixed");
+    if (parent->second == 0)
+      throw InputError(head + "link '" + joint.parent + "' has an elastic joint already; keep one");
+    if (!joint.dof.empty())
+      throw InputError(head + "is elastic and has no properties of its own; give the link's");
+    joint.n_coordinates = std::exchange(parent->second, 0);
+  }
+  for (const LinkSpec& link : spec.links)
+    if (const auto at = coordinates.find(link.name); at != coordinates.end() && at->second > 0)
+      throw InputError("link '" + link.name + "'" + where +
+                       ": is elastic, and no elastic joint is on it; add one, to the link at its "
+                       "end");
+  for (const LoopJointSpec& loop : spec.loop_joints)
+    for (const std::string& name : {loop.joint.parent, loop.joint.child})
+      if (coordinates.count(name))
+        throw InputError("joint '" + loop.joint.name + "'" + where + ": link '" + name +
+                         "' is elastic; let the joint be on the link at its end");
+}
+
+}  // namespace
+
 void validate(ModelSpec& spec, std::vector<Note>& notes) {
   const std::string where = source_of(spec);
   if (spec.links.empty())
@@ -108,6 +159,7 @@ void validate(ModelSpec& spec, std::vector<Note>& notes) {
     throw InputError("model '" + spec.name + "'" + where +
                      ": gravity is not finite; give three finite numbers in m/s2");
   for (const LinkSpec& link : spec.links) validate_link(link, where, notes);
+  validate_ports(spec, where);
   for (JointSpec& joint : spec.joints) {
     validate_joint(joint, where);
     note_idle(joint, notes);
@@ -217,6 +269,9 @@ void validate_link(const LinkSpec& link, const std::string& where, std::vector<N
     if (!std::isfinite(x))
       throw InputError(head + "a parameter of body kind " + BodyKinds::names[kind] +
                        " is not finite; give finite numbers");
+  const std::string fault = BodyKinds::dispatch(
+      link.body_kind, [&](auto of) { return decltype(of)::Body::fault(link.parameters); });
+  if (!fault.empty()) throw InputError(head + fault);
   double principal[3];
   principal_moments(link.inertia, principal);
   const double scale = std::max(std::abs(principal[0]), std::abs(principal[2]));
@@ -277,7 +332,7 @@ void validate_joint(JointSpec& joint, const std::string& where) {
   }
   validate_initial(joint, head);
   const int nv = joint_dof(joint);
-  if (nv > 6)
+  if (nv > 6 && joint.type != JointType::elastic)
     throw InputError(head + "has " + std::to_string(nv) +
                      " degrees of freedom; a joint can have 6 at most");
 }

@@ -52,6 +52,7 @@ int Paths::positions(int lanes) const {
 }
 
 bool paths_fill(const Model& model, int lanes) {
+  if (!model.own_element.empty()) return false;
   const bool branches = std::any_of(model.topology.begin(), model.topology.end(),
                                     [](const BodyTopology& body) { return body.n_children > 1; });
   const auto at_ground = std::count_if(model.topology.begin(), model.topology.end(),

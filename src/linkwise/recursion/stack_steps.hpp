@@ -95,7 +95,10 @@ void project_on_elements(const Model& model, const BodyTopology& body, const S* 
                          S* tau) {
   for (int i = body.n_elements - 1; i >= 0; --i) {
     const Element& e = model.elements[body.first_element + i];
-    for (int k = 0; k < e.nv; ++k) tau[e.v + k] = dot(element_column<S>(e, k), w);
+    if (e.kind == ElementKind::elastic)  // beside what the body takes itself
+      for_columns(e, q, [&](int k, const Motion<S>& column) { tau[e.v + k] += dot(column, w); });
+    else
+      for (int k = 0; k < e.nv; ++k) tau[e.v + k] = dot(element_column<S>(e, k), w);
     if (i > 0) w = transpose_times(element_pose(e, q), w);
   }
 }

@@ -12,6 +12,7 @@
 #include "linkwise/kinematics/placement.hpp"
 #include "linkwise/kinematics/user_frames.hpp"
 #include "linkwise/recursion/loop_steps.hpp"
+#include "linkwise/recursion/own_bodies.hpp"
 #include "linkwise/recursion/stack_steps.hpp"
 #include "linkwise/recursion/steps.hpp"
 
@@ -27,6 +28,7 @@ class TreeSweeps {
         body_(tree.n_bodies()),
         general_(tree.n_general),
         stack_(tree.n_general),
+        own_(tree),
         receiver_(tree.n_bodies()) {
     const auto& armature = model_.dof_values(DofProperty::armature);
     const std::vector<char> opens = first_of_siblings(model_);
@@ -104,7 +106,10 @@ class TreeSweeps {
         store(b.velocity,
               outward_velocity<J>(place<J>(n), v_parent, k.pitch, in.v ? in.v[at.v] : S{}));
       }
-      b.sum.p = condensed_bias(own, model_, in, n, b.velocity);
+      if constexpr (has_coordinates<std::remove_cvref_t<decltype(own)>>)
+        b.sum.p = again ? own_.update_bias(in, n, b.velocity) : own_.update(in, n, b.velocity);
+      else
+        b.sum.p = momentum_bias(own, b.velocity);
     };
     sweep_bodies_outward(model_, ranges, Motion<S>{}, velocity_of, step);
   }
@@ -114,9 +119,7 @@ class TreeSweeps {
     for (int n = 0; n < model_.n_bodies(); ++n) {
       body_[n].velocity = {};
       body_[n].sum.p = {};
-      where_coordinates(model_, in, n, [&](const auto& body, const auto& inside) {
-        body_[n].sum.p = condense(body, Motion<S>{}, inside).p;
-      });
+      if (own_.has(n)) own_.rest(n);
       const BodyTopology& at = model_.topology[n];
       if (at.joint_kind != JointKind::general) continue;
       BodyState<S> state;
@@ -144,7 +147,11 @@ class TreeSweeps {
       Body& b = body_[n];
       ArticulatedInertia<S> Y{};
       if (at.n_children > 0) Y = b.sum.Y;
-      add_condensed(Y, own, model_, in, n, b.velocity);
+      if constexpr (has_coordinates<std::remove_cvref_t<decltype(own)>>) {
+        if (!own_.eliminate(in, n, Y, b.sum.p)) fail(n);
+      } else {
+        add_inertia(Y, own);
+      }
       if constexpr (is_general<J>) {
         eliminate_stack(in, n, Y, with_loads);
       } else {
@@ -171,9 +178,11 @@ class TreeSweeps {
       const BodyTopology& at = model_.topology[n];
       const BodyConstants<double>& k = model_.constants[n];
       Body& b = body_[n];
+      if (own_.has(n)) own_.respond(in, n, b.sum.p);
       Force<S> p = b.sum.p;
       if constexpr (is_general<J>) {
         respond_stack(in, n, p);
+        if (on_port(model_, at)) own_.receive(n, p);
       } else {
         Motion<S> c;
         if constexpr (moving) c = J::bias(b.velocity, k.pitch, in.v[at.v]);
@@ -194,6 +203,8 @@ class TreeSweeps {
       const BodyConstants<double>& k = model_.constants[n];
       Body& b = body_[n];
       Motion<S> a = place<J>(n).to_child(a_parent);
+      if constexpr (is_general<J>)
+        if (on_port(model_, at)) own_.accelerate_port(n, du, a);
       if (with_loads)
         store(reduced_[n].joint_load,
               outward_load(reduced_[n].template inertia<J>(), reduced_[n].p, a));
@@ -203,10 +214,7 @@ class TreeSweeps {
         const Motion<S> c = J::bias(b.velocity, k.pitch, in.v ? in.v[at.v] : S{});
         du[at.v] = accelerate<J>(b.axis, c, k.pitch, a);
       }
-      where_coordinates(model_, in, n, [&](const auto& body, const auto& inside) {
-        const int first = model_.elements[model_.own_element[n]].v;
-        accelerate_own(body, Motion<S>(b.velocity), inside, a, du + first);
-      });
+      if (own_.has(n)) own_.accelerate(n, a, du);
       store(b.acceleration, a);
     };
     sweep_outward(model_, ranges, ground, acceleration_of, step);
@@ -412,6 +420,9 @@ class TreeSweeps {
       state.v = state.X * v_parent;
       state.v += relative;
       state.c = cross(state.v, relative);
+    } else if (on_port(model_, at)) {
+      own_.update_port(in, n, v_parent, state);
+      general_[at.general].n = 0;
     } else {
       calc_general_state(model_, at, in, v_parent, state, general_[at.general]);
     }
@@ -432,6 +443,7 @@ class TreeSweeps {
     reduce(joint.n, own.columns, own.c, Y, p);
     if (with_loads) keep<GeneralJoint>(n, Y, p);
     if (at.parent >= 0) contribute(n, place<GeneralJoint>(n), Y, p);
+    if (on_port(model_, at)) own_.receive(n, pose_[n], Y, p);
   }
 
   /// The parent feels nothing but the joint's own forces.
@@ -473,6 +485,7 @@ class TreeSweeps {
   std::vector<Transform<S>> pose_;  ///< of bodies that are no hinges
   std::vector<GeneralState<S>> general_;
   std::vector<Stack> stack_;
+  OwnBodies<S> own_;
   std::vector<Receiver> receiver_;
   std::vector<Reduced> reduced_;  ///< made when loads are first asked for
   std::atomic<int> failed_body_ = -1;

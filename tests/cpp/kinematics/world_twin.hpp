@@ -370,6 +370,8 @@ class WorldTwin {
       case JointType::universal:
         move_axis(AxisKind::revolute, s.axes[0], own[0], at, column[0]);
         return move_axis(AxisKind::revolute, s.axes[1], own[1], at, column[1]);
+      case JointType::elastic:
+        throw std::logic_error("the twin has rigid bodies");
       case JointType::composite:
         for (size_t k = 0; k < s.axes.size(); ++k)
           move_axis(s.axes[k].kind, s.axes[k], own[k], at, column[k]);

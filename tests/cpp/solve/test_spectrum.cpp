@@ -5,7 +5,7 @@
 
 #include "linear/block_tree_scenes.hpp"
 #include "linkwise/base/error.hpp"
-#include "linkwise/linear/symmetric_eigen.hpp"
+#include "linkwise/base/symmetric_eigen.hpp"
 #include "linkwise/solve/spectrum.hpp"
 
 namespace linkwise::testing {
@@ -104,7 +104,7 @@ TEST(SymmetricEigen, DiagonalisesEverySize) {
     const Block original = a;
     std::array<double, 6> values{};
     Block vectors;
-    symmetric_eigen(n, a, values, vectors);
+    symmetric_eigen<6>(n, a.data(), values.data(), vectors.data());
     for (int k = 0; k < n; ++k)
       for (int i = 0; i < n; ++i) {
         double image = 0.0, overlap = 0.0;

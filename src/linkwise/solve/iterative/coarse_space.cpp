@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "linkwise/linear/symmetric_eigen.hpp"
+#include "linkwise/base/symmetric_eigen.hpp"
 
 namespace linkwise {
 namespace {
@@ -128,7 +128,7 @@ void CoarseSpace::select(const BlockTree& A, const Cut& cut, double threshold) {
     for (int s = 0; s < rows; ++s)
       for (int k = 0; k < cols; ++k) square[6 * r + s] += w[6 * r + k] * w[6 * s + k];
   std::array<double, 6> squares{};
-  symmetric_eigen(rows, square, squares, u);
+  symmetric_eigen<6>(rows, square.data(), squares.data(), u.data());
   for (int q = 0; q < rows; ++q) {
     if (!(squares[q] > threshold * threshold)) continue;
     std::array<double, 6> left{}, right{};

@@ -1,0 +1,106 @@
+// Elastic links of a Model and of a ModelBuilder.
+#include "bind.hpp"
+#include "joint_lists.hpp"
+#include "linkwise/model/flexible_link.hpp"
+#include "vectors.hpp"
+
+namespace linkwise::bindings {
+namespace {
+
+double of_section(nb::handle section, const char* name) {
+  if (!nb::hasattr(section, name))
+    throw InputError(
+        "section is " + nb::cast<std::string>(nb::str(nb::repr(section))) +
+        "; give a linkwise.Section, as Section.round(0.03) or Section.tube(0.05, 0.002)");
+  return real_number(section.attr(name), (std::string("section's ") + name).c_str());
+}
+
+FlexibleLink flexible_link(std::string link, nb::handle section, nb::handle E, nb::handle G,
+                           nb::handle density, nb::handle damping, nb::handle bodies,
+                           nb::handle interior_modes, bool stretches, nb::handle end,
+                           nb::handle z) {
+  FlexibleLink out;
+  out.link = std::move(link);
+  out.E = real_number(E, "E");
+  out.G = real_number(G, "G");
+  out.area = of_section(section, "area");
+  out.Iy = of_section(section, "Iy");
+  out.Iz = of_section(section, "Iz");
+  out.J = of_section(section, "J");
+  if (!density.is_none()) out.density = real_number(density, "density");
+  out.damping = real_number(damping, "damping");
+  out.bodies = whole_number(bodies, "bodies").value_or(1);
+  out.interior_modes = whole_number(interior_modes, "interior_modes").value_or(2);
+  out.stretches = stretches;
+  if (!end.is_none()) out.end = vec3(end, "end");
+  if (!z.is_none()) out.z = vec3(z, "z");
+  return out;
+}
+
+template <class... Given>
+PyModel* with_flexible(const PyModel& self, std::string link, Given... given) {
+  self.model->link_index(link);
+  return new PyModel(
+      with_flexible_link(self.model->spec(), flexible_link(std::move(link), given...)));
+}
+
+template <class... Given>
+void make_flexible(ModelBuilder& self, std::string link, Given... given) {
+  self.make_flexible(flexible_link(std::move(link), given...));
+}
+
+constexpr const char* arguments = R"(
+
+A beam of Euler and Bernoulli from the link's frame, where its inboard joint is, to its end, which
+carries what the link carried: it bends in two planes, twists and stretches. Its second-order
+shortening is part of it, so that it gets stiffer when it spins or is pulled. The link's mass is
+spread over its length; its inertia becomes that of the beam.
+
+Args:
+    link: its name.
+    section: a linkwise.Section: area, Iy, Iz, J, about the beam's axes.
+    E, G: Young's and the shear modulus [Pa].
+    density: [kg/m3]; None: the link's mass over its length.
+    damping: ratio of each mode to critical damping, 0: none.
+    bodies: beams in a row. More follow larger deflections: one is good to a tenth of its length.
+    interior_modes: of each plane and beam, 0 to 4, besides two that are exact under loads at its
+        end.
+    stretches: False leaves out its stretch, whose vibration is the fastest.
+    end: (3,) in the link's frame [m], where it ends; None: where its outboard joints are.
+    z: (3,) in the link's frame, near the beam's z axis; None: the link's z, or its x for a beam
+        along z. The beam's x is along it.
+
+Raises:
+    InputError: the link is unknown or flexible already, its joints are at several points, its ends
+        coincide, or a number is wrong.)";
+
+}  // namespace
+
+void bind_flexible(ModelClass& model, nb::class_<ModelBuilder>& builder) {
+  using nb::handle;
+  model.def(
+      "with_flexible",
+      &with_flexible<handle, handle, handle, handle, handle, handle, handle, bool, handle, handle>,
+      "link"_a, nb::kw_only(), "section"_a, "E"_a, "G"_a, "density"_a = nb::none(),
+      "damping"_a = 0.0, "bodies"_a = 1, "interior_modes"_a = 2, "stretches"_a = true,
+      "end"_a = nb::none(), "z"_a = nb::none(), nb::rv_policy::take_ownership,
+      (std::string("The same machine with an elastic link.") + arguments).c_str());
+  model.def_prop_ro(
+      "beam_lengths",
+      [](const PyModel& self) {
+        nb::dict out;
+        for (const LinkSpec& link : self.model->spec().links)
+          if (link.body_kind == BodyKind::beam) out[link.name.c_str()] = link.parameters[0];
+        return out;
+      },
+      "Length [m] of each elastic link, by its name; links in a row count each for itself.");
+  builder.def(
+      "make_flexible",
+      &make_flexible<handle, handle, handle, handle, handle, handle, handle, bool, handle, handle>,
+      "link"_a, nb::kw_only(), "section"_a, "E"_a, "G"_a, "density"_a = nb::none(),
+      "damping"_a = 0.0, "bodies"_a = 1, "interior_modes"_a = 2, "stretches"_a = true,
+      "end"_a = nb::none(), "z"_a = nb::none(),
+      (std::string("Makes a link elastic, once build has all of its joints.") + arguments).c_str());
+}
+
+}  // namespace linkwise::bindings

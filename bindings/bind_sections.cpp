@@ -1,0 +1,82 @@
+// Loads inside elastic links.
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "bind.hpp"
+#include "linkwise/dynamics/section_loads.hpp"
+#include "report.hpp"
+#include "states.hpp"
+
+namespace linkwise::bindings {
+namespace {
+
+int body_of(const Model& m, const std::string& link) {
+  const int joint = m.links[m.link_index(link)].joint;
+  if (joint < 0)
+    throw InputError("link '" + link + "'" + m.where() + " is the ground; name an elastic link");
+  return m.joints[joint].body;
+}
+
+nb::object section_loads(const PyModel& self, const std::vector<std::string>& links,
+                         const std::vector<double>& places, nb::handle q, nb::handle v,
+                         nb::handle acceleration, nb::handle joint_load, double gravity) {
+  const Model& m = *self.model;
+  if (links.size() != places.size())
+    throw InputError("links has " + std::to_string(links.size()) + " names and places " +
+                     std::to_string(places.size()) + "; give one place per name");
+  std::vector<BeamSection> sections;
+  for (size_t i = 0; i < links.size(); ++i) sections.push_back({body_of(m, links[i]), places[i]});
+  const States s(m, q, v, acceleration, "acceleration", nb::none());
+  const Argument load("joint_load", {size(m.n_loads()), 6}, joint_load);
+  if (!load.given || load.lead() != s.lead)
+    throw InputError(
+        "joint_load has other leading axes than q, v and acceleration; give the "
+        "joint loads of these states");
+  const size_t n = sections.size();
+  NewArray out(s.lead, {n, 10});
+  without_gil([&](const GoOn& go_on) {
+    SectionLoads of(m, sections);
+    std::vector<double> loads(6 * n), elastic(4 * n);
+    for (size_t i = 0; i < s.count && go_on(); ++i) {
+      SweepInput<double> in;
+      in.q = s.q.data + i * size(m.nq());
+      in.v = s.v.given ? s.v.data + i * size(m.nv()) : nullptr;
+      in.gravity_factor = gravity;
+      of.evaluate(in, s.tau.data + i * size(m.nv()), load.data + i * size(6 * m.n_loads()),
+                  loads.data(), elastic.data());
+      for (size_t k = 0; k < n; ++k) {
+        double* row = out.data + 10 * (i * n + k);
+        std::copy_n(loads.data() + 6 * k, 6, row);
+        std::copy_n(elastic.data() + 4 * k, 4, row + 6);
+      }
+    }
+  });
+  check_result(out.data, s.count * n * 10);
+  return out.array;
+}
+
+}  // namespace
+
+void bind_sections(nb::module_& m) {
+  m.def("section_loads", &section_loads, "model"_a, "links"_a, "places"_a, "q"_a, "v"_a,
+        "acceleration"_a, "joint_load"_a, nb::kw_only(), "gravity"_a = 1.0,
+        R"(Loads at sections of elastic links: what the inboard part puts on the outboard part.
+
+Args:
+    model: the machine.
+    links: an elastic link per section.
+    places: where each section is, from the start of its link [m].
+    q: (..., nq) [rad, m]; v: (..., nv) [rad/s, m/s]; acceleration: (..., nv) [rad/s2, m/s2];
+        joint_load: (..., n_loads, 6) [N, N m]: states with their accelerations and loads.
+    gravity: times the model's.
+
+Returns:
+    (..., sections, 10): force x, y, z [N] and moment x, y, z [N m] in the axes of the bent section,
+    x along the beam, by equilibrium of the outboard part; then what strains and damping say of the
+    force along x and the three moments. Tension is a negative force along x.
+
+Raises:
+    InputError: a link is no elastic one, a place is not on it, or leading axes differ.)");
+}
+
+}  // namespace linkwise::bindings

@@ -1,0 +1,194 @@
+#include "linkwise/model/flexible_link.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "linkwise/base/error.hpp"
+#include "linkwise/model/validate.hpp"
+#include "linkwise/spatial/composite.hpp"
+
+namespace linkwise {
+namespace {
+
+double length_of(const Vec3<double>& a) { return std::sqrt(dot(a, a)); }
+
+/// Of the joints that the link carries, all at one point.
+Vec3<double> end_of(const ModelSpec& spec, const FlexibleLink& flexible, const std::string& head) {
+  const JointSpec* first = nullptr;
+  if (flexible.end) return *flexible.end;
+  for (const JointSpec& joint : spec.joints) {
+    if (joint.parent != flexible.link) continue;
+    if (!first) first = &joint;
+    if (length_of(joint.translation - first->translation) >
+        1e-9 * (1 + length_of(joint.translation)))
+      throw InputError(head + "joints '" + first->name + "' and '" + joint.name +
+                       "' are at different points of it; let all joints be at its end, and rigid "
+                       "links carry what is elsewhere");
+  }
+  for (const LoopJointSpec& loop : spec.loop_joints) {
+    const bool parent = loop.joint.parent == flexible.link;
+    if (first || (!parent && loop.joint.child != flexible.link)) continue;
+    return parent ? loop.joint.translation : loop.child_translation;
+  }
+  if (!first)
+    throw InputError(head +
+                     "carries no joint that would say where it ends; give end, a point in "
+                     "the link's frame");
+  return first->translation;
+}
+
+/// Columns: x along the beam, z as near as can be to the one that is wanted.
+Mat3<double> beam_axes(const FlexibleLink& flexible, const Vec3<double>& end,
+                       const std::string& head) {
+  const Vec3<double> x = (1 / length_of(end)) * end;
+  Vec3<double> z = flexible.z.value_or(Vec3<double>{0, 0, 1});
+  if (flexible.z && !(length_of(cross(z, x)) > 1e-6 * length_of(z)))
+    throw InputError(head + "z is along the beam or zero; give a direction across it");
+  if (!(length_of(cross(z, x)) > 1e-6)) z = {1, 0, 0};
+  z = z - dot(z, x) * x;
+  z = (1 / length_of(z)) * z;
+  const Vec3<double> y = cross(z, x);
+  return {{x.x, y.x, z.x, x.y, y.y, z.y, x.z, y.z, z.z}};
+}
+
+void require_positive(const std::string& head, const char* name, double value, const char* unit) {
+  if (!(value > 0) || !std::isfinite(value))
+    throw InputError(head + name + " is " + number_text(value) + "; give a positive number" +
+                     (*unit ? std::string(" in ") + unit : ""));
+}
+
+void check_numbers(const FlexibleLink& of, const std::string& head) {
+  require_positive(head, "E", of.E, "Pa");
+  require_positive(head, "G", of.G, "Pa");
+  require_positive(head, "the section's area", of.area, "m2");
+  require_positive(head, "the section's Iy", of.Iy, "m4");
+  require_positive(head, "the section's Iz", of.Iz, "m4");
+  require_positive(head, "the section's J", of.J, "m4");
+  if (of.density) require_positive(head, "density", *of.density, "kg/m3");
+  if (!(of.damping >= 0) || !std::isfinite(of.damping))
+    throw InputError(head + "damping is " + number_text(of.damping) +
+                     "; give the damping ratio of its modes, 0 or more");
+  if (of.bodies < 1 || of.bodies > 100000)
+    throw InputError(head + "bodies is " + std::to_string(of.bodies) +
+                     "; give the number of beams in a row, 1 to 100000");
+  if (of.interior_modes < 0 || of.interior_modes > most_interior_modes)
+    throw InputError(head + "interior_modes is " + std::to_string(of.interior_modes) +
+                     "; give 0 to " + std::to_string(most_interior_modes) + ", or more bodies");
+}
+
+/// A straight beam from the origin along x, as a rigid link.
+void set_straight(LinkSpec& link, const BeamProperties& of, const Mat3<double>& axes) {
+  const double L = of.length, m = of.mass_per_length * L;
+  link.mass = m;
+  link.com = axes * Vec3<double>{L / 2, 0, 0};
+  Sym3<double> I{{L * (of.rotary_y + of.rotary_z), 0, L * of.rotary_y + m * L * L / 12, 0, 0,
+                  L * of.rotary_z + m * L * L / 12}};
+  link.inertia = congruence(transpose(axes), I);
+  link.body_kind = BodyKind::beam;
+  const auto* first = reinterpret_cast<const double*>(&of);
+  link.parameters.assign(first, first + Beam::n_parameters);
+}
+
+/// What hung on the link hangs on `end`, whose frame is that of the beam, moved there.
+void move_to_end(ModelSpec& spec, const std::string& link, const std::string& end,
+                 const Mat3<double>& axes, const Vec3<double>& at) {
+  const auto move = [&](std::string& name, Mat3<double>& rotation, Vec3<double>& translation) {
+    if (name != link) return;
+    name = end;
+    rotation = transpose(axes) * rotation;
+    translation = transpose_times(axes, translation - at);
+    if (length_of(translation) <= 1e-9 * (1 + length_of(at))) translation = {};
+  };
+  for (JointSpec& joint : spec.joints) move(joint.parent, joint.rotation, joint.translation);
+  for (LoopJointSpec& loop : spec.loop_joints) {
+    move(loop.joint.parent, loop.joint.rotation, loop.joint.translation);
+    move(loop.joint.child, loop.child_rotation, loop.child_translation);
+  }
+}
+
+std::string hertz(double omega) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", omega / (2 * std::numbers::pi));
+  return text;
+}
+
+/// Of the whole link, clamped where it starts and free where it ends.
+std::string frequencies(const BeamProperties& of, double length) {
+  const double mu = of.mass_per_length, bending = 3.5160152685 / (length * length),
+               quarter = std::numbers::pi / 2 / length;
+  std::string text = "is an elastic beam of " + number_text(length) +
+                     " m; clamped at its start it " + "bends at " +
+                     hertz(bending * std::sqrt(of.EIz / mu)) + " Hz along its y and " +
+                     hertz(bending * std::sqrt(of.EIy / mu)) + " Hz along its z, twists at " +
+                     hertz(quarter * std::sqrt(of.GJ / (of.rotary_y + of.rotary_z))) + " Hz";
+  if (of.stretches != 0)
+    text += " and stretches at " + hertz(quarter * std::sqrt(of.EA / mu)) + " Hz";
+  return text;
+}
+
+}  // namespace
+
+ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
+  const std::string& name = flexible.link;
+  const std::string head = "flexible link '" + name + "'" + source_of(spec) + ": ";
+  const auto found = std::find_if(spec.links.begin(), spec.links.end(),
+                                  [&](const LinkSpec& link) { return link.name == name; });
+  if (found == spec.links.end()) {
+    std::vector<std::string> known;
+    for (const LinkSpec& link : spec.links) known.push_back(link.name);
+    throw InputError(head + "does not exist" + suggest(name, known));
+  }
+  if (found->body_kind != BodyKind::rigid)
+    throw InputError(head + "is flexible already; make it so once");
+  check_numbers(flexible, head);
+  const Vec3<double> end = end_of(spec, flexible, head);
+  if (!(length_of(end) > 0) || !std::isfinite(length_of(end)))
+    throw InputError(head +
+                     "its ends coincide; give end, the point where it ends, apart from its "
+                     "inboard joint");
+  const Mat3<double> axes = beam_axes(flexible, end, head);
+  const double length = length_of(end);
+  if (!flexible.density && !(found->mass > 0))
+    throw InputError(head + "has no mass; give density in kg/m3, or the link a mass");
+  BeamProperties of{};
+  of.length = length / flexible.bodies;
+  of.mass_per_length = flexible.density ? *flexible.density * flexible.area : found->mass / length;
+  of.EA = flexible.E * flexible.area;
+  of.EIy = flexible.E * flexible.Iy;
+  of.EIz = flexible.E * flexible.Iz;
+  of.GJ = flexible.G * flexible.J;
+  of.rotary_y = of.mass_per_length * flexible.Iy / flexible.area;
+  of.rotary_z = of.mass_per_length * flexible.Iz / flexible.area;
+  of.damping_ratio = flexible.damping;
+  of.interior_modes = flexible.interior_modes;
+  of.stretches = flexible.stretches;
+  std::copy(axes.m, axes.m + 9, of.axes);
+  set_straight(*found, of, axes);
+  const std::string tip = name + ":end";
+  move_to_end(spec, name, tip, axes, end);
+
+  JointSpec joint;
+  joint.type = JointType::elastic;
+  joint.rotation = axes;
+  joint.translation = axes * Vec3<double>{of.length, 0, 0};
+  const auto identity = Mat3<double>::identity();
+  std::copy(identity.m, identity.m + 9, of.axes);
+  std::string before = name;
+  for (int i = 1; i <= flexible.bodies; ++i) {
+    joint.name = name + ":" + std::to_string(i);
+    joint.parent = before;
+    joint.child = i < flexible.bodies ? name + ":" + std::to_string(i + 1) : tip;
+    spec.joints.push_back(joint);
+    spec.links.push_back({joint.child, 0, {}, {}});
+    if (i < flexible.bodies) set_straight(spec.links.back(), of, identity);
+    before = joint.child;
+    joint.rotation = identity;
+    joint.translation = {of.length, 0, 0};
+  }
+  spec.notes.push_back({NoteLevel::info, name, frequencies(of, length)});
+  return spec;
+}
+
+}  // namespace linkwise

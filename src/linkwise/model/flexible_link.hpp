@@ -1,0 +1,29 @@
+#pragma once
+// Makes an elastic beam of a rigid link of a spec: a row of beams, each welded to the end of the
+// one before, from the link's frame to the point where its outboard joints are.
+#include <optional>
+#include <string>
+
+#include "linkwise/model/spec.hpp"
+
+namespace linkwise {
+
+struct FlexibleLink {
+  std::string link;
+  double E, G;                    ///< moduli, Pa
+  double area, Iy, Iz, J;         ///< of the section, m2 and m4; y and z are the beam's axes
+  std::optional<double> density;  ///< kg/m3; else the link's mass is spread over its length
+  double damping = 0;             ///< ratio of every mode
+  int bodies = 1, interior_modes = 2;
+  bool stretches = true;
+  std::optional<Vec3<double>> end;  ///< in the link's frame, m; else where its joints are
+  std::optional<Vec3<double>> z;    ///< near the beam's z axis, in the link's frame; else its z
+};
+
+/// The link of this name becomes the first beam; the others are links `NAME:2`, `NAME:3` ..., and
+/// `NAME:end` is a link without mass at the last one's end, which carries what the link carried.
+/// Elastic joints `NAME:1` ... join them. Throws InputError where the link is not there, is
+/// flexible already, its joints are at several points, or a number is wrong.
+ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible);
+
+}  // namespace linkwise
