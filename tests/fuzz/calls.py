@@ -50,6 +50,7 @@ GOOD = {
     "quantities": lambda rng, model: [rng.choice([entry["name"] for entry in lw.quantities()])],
     "causes": lambda rng, model: ["gravity"],
     "text": lambda rng, model: "name",
+    "section": lambda rng, model: lw.Section.round(0.01 + rng.random()),
     "kind": lambda rng, model: rng.choice(("revolute", "prismatic", "spherical", "floating")),
     "interpolation": lambda rng, model: rng.choice(("linear", "cubic")),
     "frame": lambda rng, model: rng.choice(("world", "body")),
@@ -116,6 +117,8 @@ METHODS = {
     "child_point:vector",
     "with_spring": "*name:text *parent:link *child:link *length:number point:vector "
     "child_point:vector stiffness:number damping:number",
+    "with_flexible": "*link *section *E:number *G:number density:number damping:number "
+    "bodies:count interior_modes:count stretches:flag end:vector z:vector",
     "with_bearing": "*joint radial:number axial:number tilt:number torsion:number axis:vector "
     "offset:number turn:vector preload:vector",
     "with_joint_type": "*joint *type:kind",
@@ -157,6 +160,7 @@ LOADS = {
     "split": "by:text",
     "split_at_peaks": "by:text",
     "in_frame": "frame point:vector fixed_in:frame",
+    "section_loads": "*link n:count",
     "cycles": "*joint *quantity",
     "spectrum": "*joint *quantity",
     "load_duration": "*joint *quantity bins:count",
