@@ -9,7 +9,7 @@ import numpy as np
 from linkwise import _core
 from linkwise._core import InputError
 from linkwise.base import Array
-from linkwise.io.complaint import near, shorten
+from linkwise.io.complaint import near, shorten, shown
 from linkwise.loads.samples import blocks, model_of, need_whole, rows
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from linkwise._core import Model
     from linkwise.loads.samples import RunLike
 
+_MOST = 10_000
 COMPONENTS = ("fx", "fy", "fz", "nx", "ny", "nz")
 
 
@@ -40,26 +41,25 @@ def section_loads(run: RunLike, link: str, n: int = 11) -> xr.Dataset:
         which strains do not say); and the coordinate x (section) [m] from the link's start.
 
     Raises:
-        InputError: the link is not elastic, n is below 2, or the run lacks a quantity.
+        InputError: the link is not elastic, n is not from 2 to 10,000, or the run lacks a quantity.
     """
     import xarray as xr
 
     model = model_of(run, None)
     need_whole(run, model, "position", "velocity", "acceleration", "joint_load")
-    if n < 2:
-        raise InputError(f"n is {n}; give 2 sections or more")
+    whole = isinstance(n, int | np.integer) and not isinstance(n, bool)
+    if not whole or not 2 <= n <= _MOST:
+        raise InputError(f"n: is {shown(n)}; give a number of sections from 2 to {_MOST}")
     links, places, x = _sections(model, link, n)
     time = np.asarray(run.dataset["time"])
     load = np.empty((len(time), n, 6))
     error = np.full((len(time), n, 6), np.nan)
     for block in blocks(run, 8 * (model.nq + 2 * model.nv + 6 * model.n_joints + 10 * n)):
-        found: Array = _core.section_loads(
-            model,
-            links,
-            places,
-            *(rows(run, name, block) for name in ("position", "velocity", "acceleration")),
-            rows(run, "joint_load", block),
+        q, v, acceleration = (
+            rows(run, name, block) for name in ("position", "velocity", "acceleration")
         )
+        joints = rows(run, "joint_load", block)
+        found: Array = _core.section_loads(model, links, places, q, v, acceleration, joints)
         load[block] = found[..., :6]
         error[block][..., [0, 3, 4, 5]] = np.abs(found[..., [0, 3, 4, 5]] - found[..., 6:])
     dims = ("time", "section", "component")
@@ -81,6 +81,8 @@ def section_loads(run: RunLike, link: str, n: int = 11) -> xr.Dataset:
 def _sections(model: Model, link: str, n: int) -> tuple[list[str], list[float], Array]:
     """Link and place on it of each section, and the distance from the start of the first link."""
     lengths = model.beam_lengths
+    if not isinstance(link, str):
+        raise InputError(f"link: is {shown(link)}; give the name of an elastic link")
     if link not in lengths:
         remedy = near(link, list(lengths), "the elastic links are") if lengths else "make it so"
         raise InputError(f"link '{shorten(link)}' is not elastic; {remedy}")

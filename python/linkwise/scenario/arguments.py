@@ -22,6 +22,7 @@ from linkwise.io.urdf_elements import placement
 from linkwise.loads.rating import Rating
 from linkwise.record.labels import joint_scalars
 from linkwise.record.schema import QUANTITIES
+from linkwise.scenario.fields import Quantity
 from linkwise.scenario.schema import (
     FreeSection,
     JointSection,
@@ -29,7 +30,6 @@ from linkwise.scenario.schema import (
     LockedSection,
     MotionSection,
     PDSection,
-    Quantity,
     ScenarioFile,
     Section,
     SpringSection,

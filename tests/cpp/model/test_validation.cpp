@@ -254,7 +254,7 @@ TEST(Validation, UnknownNamesGetSuggestions) {
 TEST(Validation, JointTypesGoByTheirNames) {
   EXPECT_EQ(error_of([] { joint_type_from_name("ball"); }),
             "joint type 'ball' is unknown; known: fixed, revolute, continuous, prismatic, helical, "
-            "cylindrical, universal, spherical, planar, floating, composite");
+            "cylindrical, universal, spherical, planar, floating, composite, elastic");
   for (const char* name : {"fixed", "revolute", "continuous", "prismatic", "helical", "cylindrical",
                            "universal", "spherical", "planar", "floating", "composite"})
     EXPECT_STREQ(joint_type_name(joint_type_from_name(name)), name);
