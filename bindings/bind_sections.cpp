@@ -1,4 +1,6 @@
 // Loads inside elastic links.
+#include <cmath>
+
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -55,9 +57,39 @@ nb::object section_loads(const PyModel& self, const std::vector<std::string>& li
   return out.array;
 }
 
+/// Angle between the start and the end of each elastic link, in the order of the links.
+nb::object beam_angles(const PyModel& self, nb::handle q) {
+  const Model& m = *self.model;
+  const States s(m, q, nb::none(), nb::none(), "tau", nb::none());
+  std::vector<std::pair<const ElasticShape*, int>> beams;  // and where its coordinates are in q
+  for (size_t l = 0; l < m.links.size(); ++l) {
+    if (m.spec().links[l].body_kind != BodyKind::beam) continue;
+    const Element& e = m.elements[m.own_element[m.joints[m.links[l].joint].body]];
+    beams.emplace_back(e.shape, e.q);
+  }
+  NewArray out(s.lead, {beams.size()});
+  for (size_t i = 0; i < s.count; ++i)
+    for (size_t b = 0; b < beams.size(); ++b) {
+      const auto& [shape, first] = beams[b];
+      const Vec3<double> theta =
+          elastic_port::theta(*shape, s.q.data + i * size(m.nq()) + size(first));
+      out.data[i * beams.size() + b] = std::sqrt(dot(theta, theta));
+    }
+  return out.array;
+}
+
 }  // namespace
 
 void bind_sections(nb::module_& m) {
+  m.def("beam_angles", &beam_angles, "model"_a, "q"_a,
+        R"(How far the end of each elastic link is turned against its start.
+
+Args:
+    model: the machine.
+    q: positions (..., nq) [rad, m].
+
+Returns:
+    (..., links) [rad], in the order of Model.beam_lengths.)");
   m.def("section_loads", &section_loads, "model"_a, "links"_a, "places"_a, "q"_a, "v"_a,
         "acceleration"_a, "joint_load"_a, nb::kw_only(), "gravity"_a = 1.0,
         R"(Loads at sections of elastic links: what the inboard part puts on the outboard part.

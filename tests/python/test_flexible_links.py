@@ -516,3 +516,60 @@ def test_a_scenario_makes_a_link_of_any_model_elastic(tmp_path):
         with pytest.raises(lw.InputError) as error:
             lw.run_scenario(scenario)
         assert message in str(error.value)
+
+
+@pytest.mark.parametrize(("force", "angle"), [(0.3, 0.15), (0.6, 0.3)])
+def test_one_beam_errs_by_the_square_of_its_bend(force, angle):
+    """A force that stays vertical on a clamped beam, against 16 beams in a row."""
+    found = []
+    for bodies in (1, 16):
+        given = {"EA": 1e6, "bodies": bodies, "interior_modes": 0, "stretches": False}
+        model = cantilever(1.0, 1.0, 1.0, **given)
+        end = model.link_names.index("beam:end")
+        q, rest = np.zeros(model.nq), np.zeros(model.nv)
+
+        def moved(q, model=model, end=end, rest=rest):
+            wrench = np.zeros((model.n_joints, 6))
+            wrench[-1, :3] = lw.link_poses(model, q)[end, 2, :3] * force
+            return accelerations(model, q, rest, wrench)
+
+        step = 1e-6 * np.eye(model.nq)
+        for _ in range(12):
+            slope = np.array([moved(q + e) - moved(q - e) for e in step]).T / 2e-6
+            q = q - np.linalg.solve(slope, moved(q))
+        found.append(lw.link_poses(model, q)[end, 2, 3])
+    assert found[0] / found[1] - 1 == pytest.approx(0.44 * angle**2, rel=0.05)
+
+
+def long_boom(bodies):
+    """A soft boom that falls from the level and hangs far down."""
+    builder = lw.ModelBuilder("boom")
+    builder.add_link("wall")
+    builder.add_link("boom", mass=3.0)
+    builder.add_joint("root", "fixed", "wall", "boom")
+    section = lw.Section.round(0.012)
+    given = {"section": section, "E": E, "G": G, "end": (2.0, 0, 0), "stretches": False}
+    builder.make_flexible("boom", bodies=bodies, interior_modes=0, damping=0.05, **given)
+    return builder.build()
+
+
+def test_a_link_that_bends_too_far_is_said():
+    """Once per link, with the bodies to give; not where these follow it."""
+    run = lw.simulate(long_boom(1), duration=0.4)
+    told = [warning for warning in run.warnings if "bends by" in warning["text"]]
+    assert [warning["element"] for warning in told] == ["boom"]
+    text = told[0]["text"]
+    needed = int(text.rpartition("give bodies = ")[2])
+    angle = float(text.partition("bends by ")[2].split()[0])
+    q = np.asarray(run.position)
+    tip = lw.link_poses(long_boom(1), q)[:, -1]
+    turned = np.arccos((np.trace(tip[:, :3, :3].T) - 1) / 2)
+    assert angle == pytest.approx(turned.max(), rel=0.05)
+    again = lw.simulate(long_boom(needed), duration=0.4)
+    assert not [warning for warning in again.warnings if "bends by" in warning["text"]]
+
+
+def test_members_that_bend_too_far_are_said():
+    model = long_boom(1)
+    found = lw.simulate_batch(model, step=1e-4, duration=0.4, q0=np.zeros((2, model.nq)))
+    assert "member 0: it bends by" in str(found.attrs)

@@ -24,6 +24,7 @@ from linkwise.simulation.arguments import (
     optional_count,
     sample_times,
 )
+from linkwise.simulation.bends import Bends
 from linkwise.simulation.determinacy import Determinacy, is_looked_at, not_looked_at
 from linkwise.simulation.recording import Recording
 from linkwise.simulation.simulate import (
@@ -201,6 +202,20 @@ def _add_determinate(
     return notes
 
 
+def _of_bends(
+    columns: Mapping[str, AnyArray], models: Sequence[Model], times: Array
+) -> list[Ignored]:
+    """What is said of elastic links that bend further than they can follow, once per link."""
+    found: dict[str, Ignored] = {}
+    positions = columns.get("position", ())
+    for member, path in enumerate(positions):
+        bends = Bends(models[member // (len(positions) // len(models))])
+        bends.take(path, times)
+        for note in bends.notes():
+            found.setdefault(note.element, note._replace(text=f"member {member}: {note.text}"))
+    return list(found.values())
+
+
 def simulate_batch(
     model: Model | Sequence[Model],
     *,
@@ -301,6 +316,7 @@ def simulate_batch(
     )
     if schema.extremes:
         columns |= schema.extremes.split(flat)
+    notes += _of_bends(columns, models, sampled)
     notes += _add_determinate(columns, schema, models, rows, by_joint, sampled)
     dataset = _dataset(columns, endings, lead, schema, sampled, not isinstance(model, Model))
     if not interrupted:

@@ -37,6 +37,7 @@ from linkwise.simulation.arguments import (
     state_vector,
 )
 from linkwise.simulation.assembling import at_loop_positions, loop_rates
+from linkwise.simulation.bends import Bends
 from linkwise.simulation.determinacy import Determinacy, is_looked_at, not_looked_at
 from linkwise.simulation.numerics import DEFAULTS, Numerics
 from linkwise.simulation.recording import Recording
@@ -236,8 +237,9 @@ def _record(
     ignored: what its reader should know from before the run.
     """
     started = clock.monotonic()
+    bends = Bends(model)
     try:
-        looking = () if determinacy is None else (_see_chunk(determinacy), determinacy.needs)
+        looking = _looking(determinacy, bends)
         ending = run_time_loop(simulation, record, schema, times, progress, *looking)
     except BaseException as error:
         # A function of the caller's (a drive, the progress) raised an exception, or the disk is
@@ -245,7 +247,8 @@ def _record(
         said = {"outcome": "error", "message": f"{type(error).__name__}: {error}"}
         with contextlib.suppress(Exception):
             found = _timeless(simulation, schema, determinacy, ended=True)
-            said |= warning_attrs([*_noticed(simulation, ignored), *ignored, *_open(determinacy)])
+            noticed = [*_noticed(simulation, ignored), *ignored, *_open(determinacy)]
+            said |= warning_attrs([*noticed, *bends.notes()])
             record.finish(said, found)
         raise
     attrs = _attributes_at_end(simulation, clock.monotonic() - started)
@@ -253,13 +256,19 @@ def _record(
     attrs["solver_error"] = "bounded" if doubt is None else "not bounded"
     found = _timeless(simulation, schema, determinacy, ended=True)
     noticed = [*_noticed(simulation, ignored), *ignored, *_open(determinacy)]
-    noticed += [] if doubt is None else [doubt]
+    noticed += [*([] if doubt is None else [doubt]), *bends.notes()]
     finished = record.finish(attrs | warning_attrs(noticed), found)
     return Run(finished, record.path, model), ending
 
 
-def _see_chunk(determinacy: Determinacy) -> Callable[[Mapping[str, Array]], object]:
-    return lambda chunk: determinacy.see(chunk["position"], chunk.get("joint_load"), chunk["time"])
+def _looking(
+    determinacy: Determinacy | None, bends: Bends
+) -> tuple[Callable[[Mapping[str, Array]], object], Collection[str]] | tuple[()]:
+    """What looks at each chunk of samples, and the quantities that it needs."""
+    if determinacy is not None:  # loops are not closed on elastic links
+        see = determinacy.see
+        return lambda of: see(of["position"], of.get("joint_load"), of["time"]), determinacy.needs
+    return () if bends.none else (bends.see, bends.needs)
 
 
 def _noticed(simulation: Simulation, ignored: Sequence[Ignored]) -> list[Ignored]:
