@@ -277,7 +277,8 @@ void bind_assembly(nb::module_& m) {
       "model"_a, "q0"_a, "v0"_a, "hold"_a,
       "loop_velocity"_a = std::vector<std::pair<std::string, std::vector<double>>>(),
       "The position near q0 (nq,) that closes all loops, and rates near v0 (nv,) that keep them "
-      "closed; loop_velocity: those of loop joints that are given, by name: see linkwise.assemble.");
+      "closed; loop_velocity: those of loop joints that are given, by name: see "
+      "linkwise.assemble.");
 }
 
 void bind_dynamics(nb::module_& m) {
