@@ -8,7 +8,7 @@ import numpy as np
 
 from linkwise import _core
 from linkwise._core import InputError
-from linkwise.base import Array
+from linkwise.base import COMPONENTS, Array
 from linkwise.io.complaint import near, shorten, shown
 from linkwise.loads.samples import blocks, model_of, need_whole, rows
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from linkwise.loads.samples import RunLike
 
 _MOST = 10_000
-COMPONENTS = ("fx", "fy", "fz", "nx", "ny", "nz")
 
 
 def section_loads(run: RunLike, link: str, n: int = 11) -> xr.Dataset:

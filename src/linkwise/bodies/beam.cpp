@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 
 #include "linkwise/base/symmetric_eigen.hpp"
-#include "linkwise/simd/cholesky.hpp"
 #include "linkwise/spatial/composite.hpp"
 
 namespace linkwise {
@@ -16,7 +16,7 @@ constexpr int most = BeamModes::most_in_plane;
 /// Nodes and weights of Gauss's quadrature on [0, 1], exact for degree 2 n - 1.
 void gauss(int n, double* node, double* weight) {
   for (int i = 0; i < n; ++i) {
-    double x = std::cos(M_PI * (i + 0.75) / (n + 0.5)), slope = 1;
+    double x = std::cos(std::numbers::pi * (i + 0.75) / (n + 0.5)), slope = 1;
     for (int round = 0; round < 20; ++round) {
       double before = 1, value = x;
       for (int k = 1; k < n; ++k) {

@@ -39,9 +39,6 @@ struct BeamProperties {
 };
 inline constexpr int most_interior_modes = 4;
 
-/// What one coordinate is: along or about x, in the plane of y, of z.
-enum class BeamCoordinate { stretch, twist, y, z };
-
 /// Constants of a beam, in its own axes. Coordinates are stretch (where it has one), twist,
 /// deflections along y, along z.
 struct BeamModes {
