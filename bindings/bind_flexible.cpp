@@ -27,6 +27,9 @@ FlexibleLink flexible_link(std::string link, nb::handle section, nb::handle E, n
   out.Iy = of_section(section, "Iy");
   out.Iz = of_section(section, "Iz");
   out.J = of_section(section, "J");
+  out.width = of_section(section, "width");
+  out.height = of_section(section, "height");
+  out.round = nb::cast<std::string>(nb::str(section.attr("shape"))) == "round";
   if (!density.is_none()) out.density = real_number(density, "density");
   out.damping = real_number(damping, "damping");
   out.bodies = whole_number(bodies, "bodies").value_or(1);

@@ -106,6 +106,8 @@ RETURNS = {
     "Simulation.advance": "dict[str, Any]",
     "Simulation.trace": "dict[str, Any]",
     "forward_dynamics": "Any",
+    "beam_properties": "dict[str, dict[str, Any]]",
+    "bent_sections": "tuple[Array, Array]",
     "initial_guesses": "list[dict[str, str]]",
     "loop_coordinates": "tuple[Array, Array]",
     "integrators": "list[dict[str, Any]]",

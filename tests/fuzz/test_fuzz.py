@@ -58,7 +58,11 @@ def test_every_public_function_is_called():
     assert methods - {"neutral_configuration", "initial_configuration", "from_bytes"} == {
         *calls.METHODS
     }
-    assert {name for name in lw.loads.__all__ if name.islower()} == {*calls.LOADS, "margins"}
+    assert {name for name in lw.loads.__all__ if name.islower()} == {
+        *calls.LOADS,
+        "margins",
+        "section_margins",
+    }
 
 
 def test_damage_is_found():

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from linkwise.cli.loads_at import AtOption, PointOption, show_at
+from linkwise.cli.loads_inside import CountOption, SectionsOption, show_sections
 from linkwise.cli.output import (
     JsonOption,
     console,
@@ -40,6 +42,7 @@ DrivenOption = Annotated[
 ]
 
 _MOST_JOINTS = 40
+_MOST_LINKS = 8
 _SHOWN = ("force", "axial", "radial", "moment", "tilting_moment", "torque", "drive_power")
 
 
@@ -51,6 +54,8 @@ def loads(
     ] = None,
     at: AtOption = None,
     point: PointOption = None,
+    sections: SectionsOption = None,
+    n: CountOption = None,
     split: Annotated[
         str | None,
         typer.Option(
@@ -83,29 +88,27 @@ def loads(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Peak loads of every joint of a RUN: with bounds, by cause, against ratings."""
+    """Peak loads of a RUN's joints, or inside its flexible links: by cause, against ratings."""
     from linkwise._core import InputError
-    from linkwise.io.complaint import shown
     from linkwise.io.writing import check_file
-    from linkwise.loads.samples import joint_position
+    from linkwise.loads.sections import elastic_links
     from linkwise.results import open_run
 
     for written in filter(None, (csv, html)):
         check_file(written)
     opened = open_run(run)
     if at is not None or point is not None:
-        if any((split, driven, ratings, certify, html)) or at is None:
+        if any((split, driven, ratings, certify, html, sections)) or at is None:
             raise InputError("--at: goes with --point, --joint, --csv, --model and --json alone")
         show_at(opened, machine_of(opened, model), at, point, joint, csv, as_json)
         return
     machine = machine_of(opened, model)
-    for name in joint or ():
-        if any(name == weld for weld, _, _ in machine.welds):
-            raise InputError(
-                f"joint {shown(name)}: is fixed and its links are merged; "
-                "add --at child for its load"
-            )
-        joint_position(opened, name)
+    if sections or n is not None:
+        if any((joint, driven, ratings, certify, html)) or not sections:
+            raise InputError("-n: goes with --sections, and that with --split, --csv, --json alone")
+        show_sections(opened, machine, sections, n, split, csv, as_json)
+        return
+    _check_joints(opened, machine, joint or ())
     found = collect(opened, machine, rating_tables(opened, ratings), certify, as_json)
     shares = peak_shares(opened, machine, split, driven) if split or driven else []
     records = peak_records(found, joint)
@@ -115,15 +118,38 @@ def loads(
         from linkwise.plot import write_report
 
         write_report(opened, html, found, machine)
-    ignored = opened.warnings
-    if joint or csv or as_json:  # whose mean, RMS and duty are of the samples
-        ignored = ignored + sampling_warnings(opened, joint)
-    extremes = found["summary"].attrs["extremes"]
+    sampled = joint or csv or as_json  # whose mean, RMS and duty are of the samples
+    ignored = opened.warnings + (sampling_warnings(opened, joint) if sampled else [])
+    extremes, elastic = found["summary"].attrs["extremes"], elastic_links(machine)
     if as_json:
         about = {"run": str(run), "extremes": extremes, "peaks": records, "split": shares}
-        print_json(about | {"warnings": ignored})
+        print_json(about | ({"flexible": elastic} if elastic else {}) | {"warnings": ignored})
         return
-    _show(tables(records, shares, joint, extremes), ignored, [csv, html])
+    made = [*tables(records, shares, joint, extremes), *_flexible(elastic)]
+    _show(made, ignored, [csv, html])
+
+
+def _check_joints(run: Run, model: Model, joints: Sequence[str]) -> None:
+    """InputError where the run has no loads of one of the joints."""
+    from linkwise._core import InputError
+    from linkwise.io.complaint import shown
+    from linkwise.loads.samples import joint_position
+
+    for name in joints:
+        if any(name == weld for weld, _, _ in model.welds):
+            raise InputError(
+                f"joint {shown(name)}: is fixed and its links are merged; "
+                "add --at child for its load"
+            )
+        joint_position(run, name)
+
+
+def _flexible(links: list[str]) -> list[str]:
+    """A line that names flexible links and says how to see what is inside."""
+    if not links:
+        return []
+    named = ", ".join(map(text, links[:_MOST_LINKS])) + (", ..." if links[_MOST_LINKS:] else "")
+    return [f"Flexible: {named}. --sections {text(links[0])}: the loads inside it"]
 
 
 def _show(made: list[Any], ignored: list[dict[str, str]], written: list[Path | None]) -> None:

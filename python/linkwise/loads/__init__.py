@@ -12,11 +12,18 @@ from linkwise.loads.fatigue import cycles, damage_equivalent, load_duration, spe
 from linkwise.loads.frames import in_frame
 from linkwise.loads.peaks import envelope, peak_loads, summary
 from linkwise.loads.rating import Rating, margins
-from linkwise.loads.sections import section_loads
+from linkwise.loads.section_summary import (
+    SectionRating,
+    section_damage,
+    section_margins,
+    section_summary,
+)
+from linkwise.loads.sections import section_loads, section_split
 
 __all__ = [
     "QUANTITIES",
     "Rating",
+    "SectionRating",
     "bounds",
     "cycles",
     "damage_equivalent",
@@ -27,7 +34,11 @@ __all__ = [
     "margins",
     "peak_loads",
     "quantities",
+    "section_damage",
     "section_loads",
+    "section_margins",
+    "section_split",
+    "section_summary",
     "spectrum",
     "split",
     "split_at_peaks",

@@ -168,6 +168,32 @@ def equivalent(ranges: Array, counts: Array, exponent: float, repetitions: float
     return float(found)
 
 
+def ranges_of(values: Array, slopes: Array, count: float) -> Array:
+    """Damage-equivalent ranges (exponent,) of one signal (time,)."""
+    counted = _count(values)
+    found = [equivalent(counted[:, 0], counted[:, 2], float(m), count) for m in slopes]
+    return np.array(found)
+
+
+def checked_exponents(exponents: Sequence[float]) -> Array:
+    """Slopes of Woehler lines, or InputError."""
+    slopes = as_floats(exponents, "exponents")
+    if slopes.ndim != 1 or not slopes.size or not (np.isfinite(slopes) & (slopes > 0)).all():
+        raise InputError("exponents: give positive numbers, such as 3, 5 and 10")
+    return slopes
+
+
+def checked_repetitions(times: Array, repetitions: float | None) -> float:
+    """How many equal cycles, one per second unless given, or InputError."""
+    if times.size < 2:
+        raise InputError("run holds one sample, and cycles need two; record more, with every=")
+    span = float(times[-1] - times[0])
+    given = as_floats(span if repetitions is None else repetitions, "repetitions")
+    if given.ndim or not (np.isfinite(given) and given > 0):
+        raise InputError("repetitions: give a positive number")
+    return float(given)
+
+
 @each_member
 def damage_equivalent(
     run: RunLike,
@@ -191,17 +217,8 @@ def damage_equivalent(
     import xarray as xr
 
     need(run, "joint_load")
-    slopes = as_floats(exponents, "exponents")
-    if slopes.ndim != 1 or not slopes.size or not (np.isfinite(slopes) & (slopes > 0)).all():
-        raise InputError("exponents: give positive numbers, such as 3, 5 and 10")
-    times = run.dataset["time"].values
-    if times.size < 2:
-        raise InputError("run holds one sample, and cycles need two; record more, with every=")
-    span = float(times[-1] - times[0])
-    given_count = as_floats(span if repetitions is None else repetitions, "repetitions")
-    if given_count.ndim or not (np.isfinite(given_count) and given_count > 0):
-        raise InputError("repetitions: give a positive number")
-    count = float(given_count)
+    slopes = checked_exponents(exponents)
+    count = checked_repetitions(run.dataset["time"].values, repetitions)
     if joints is not None and (isinstance(joints, str) or not _is_list(joints)):
         raise InputError(f"joints: {shown(joints)} given; give a list of names")
     names = joint_names(run) if joints is None else list(joints)
@@ -210,9 +227,8 @@ def damage_equivalent(
     found = np.zeros((slopes.size, len(names), len(COMPONENTS)))
     for j in range(len(names)):
         for c, component in enumerate(COMPONENTS):
-            counted = _count(_turning(run, load[:, j, c], where[j], component))
-            for k, m in enumerate(slopes):
-                found[k, j, c] = equivalent(counted[:, 0], counted[:, 2], float(m), count)
+            values = _turning(run, load[:, j, c], where[j], component)
+            found[:, j, c] = ranges_of(values, slopes, count)
     given = run.dataset["joint_load"]
     mask = joint_rows(run, names)
     known = {} if mask is None else {DETERMINATE: (("joint", "component"), mask)}

@@ -10,6 +10,7 @@ from linkwise.scenario.read import (
     load_scenario,
     parse_axis,
     ratings_in,
+    section_ratings_in,
     variant,
 )
 
@@ -19,5 +20,6 @@ __all__ = [
     "load_scenario",
     "parse_axis",
     "ratings_in",
+    "section_ratings_in",
     "variant",
 ]

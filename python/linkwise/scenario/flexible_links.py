@@ -6,7 +6,7 @@ from linkwise._core import InputError, Model
 from linkwise.flexible.section import Section
 from linkwise.io.complaint import near, shorten
 from linkwise.scenario.arguments import ScenarioSource
-from linkwise.scenario.schema import SHAPES
+from linkwise.scenario.schema import OUTSIDE, SHAPES
 
 
 def with_flexible_links(source: ScenarioSource, model: Model) -> Model:
@@ -19,11 +19,15 @@ def with_flexible_links(source: ScenarioSource, model: Model) -> Model:
         needed = SHAPES[link.section]
         for size in sorted({size for sizes in SHAPES.values() for size in sizes}):
             given = getattr(link, size) is not None
+            if link.section == "general" and size in OUTSIDE:
+                continue
             if given != (size in needed):
                 text = f"a {link.section} section is given by {', '.join(needed)}"
                 problem = f"{size} is {'given' if given else 'missing'}: {text}"
                 source.complain(keys, problem, f"{'leave it out' if given else 'give it'}")
         sizes = {size: getattr(link, size) for size in needed}
+        if link.section == "general":
+            sizes |= {size: getattr(link, size) or 0.0 for size in OUTSIDE}
         make = getattr(Section, link.section, Section)
         try:
             model = model.with_flexible(

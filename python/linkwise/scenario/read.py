@@ -21,6 +21,7 @@ from linkwise.io.complaint import complain, near, shorten
 from linkwise.io.files import SCENARIO_BYTES, read_bytes
 from linkwise.io.load import load
 from linkwise.loads.rating import Rating
+from linkwise.loads.section_summary import SectionRating
 from linkwise.notes import quiet, tell, warnings_of
 from linkwise.scenario.arguments import (
     ArgumentBuilder,
@@ -31,7 +32,7 @@ from linkwise.scenario.arguments import (
     with_properties,
 )
 from linkwise.scenario.flexible_links import with_flexible_links
-from linkwise.scenario.schema import RatingsFile, ScenarioFile, describe, keys_at
+from linkwise.scenario.schema import FlexibleFile, RatingsFile, ScenarioFile, describe, keys_at
 from linkwise.scenario.toml_slips import diagnose
 
 #: Keys that say how a model file is loaded.
@@ -236,6 +237,21 @@ def load_ratings(path: str | os.PathLike[str]) -> dict[str, Rating]:
 def ratings_in(scenario_text: str) -> dict[str, Rating]:
     """The ratings in the text of a scenario, such as a run keeps."""
     return _ratings("scenario of the run", scenario_text.encode("utf-8"))
+
+
+def section_ratings_in(scenario_text: str) -> dict[str, SectionRating]:
+    """What sections of flexible links may carry, by link, in the text of a scenario."""
+    name = "scenario of the run"
+    _, document = _read_toml(name, scenario_text.encode("utf-8"))
+    try:
+        found = FlexibleFile.model_validate({"flexible": document.get("flexible", {})})
+    except ValidationError as error:
+        _complain_first(name, error)
+    return {
+        link: SectionRating(stress=section.allowable_stress)
+        for link, section in found.flexible.items()
+        if section.allowable_stress is not None
+    }
 
 
 def _ratings(path: str | os.PathLike[str], data: bytes) -> dict[str, Rating]:

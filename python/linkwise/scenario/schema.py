@@ -315,6 +315,8 @@ SHAPES: dict[str, tuple[str, ...]] = {
     "box": ("width", "height", "wall"),
     "general": ("area", "Iy", "Iz", "J"),
 }
+#: What a general section may be given besides: the outer sizes, for its stresses.
+OUTSIDE = ("width", "height")
 
 
 class FlexibleSection(Section):
@@ -338,6 +340,7 @@ class FlexibleSection(Section):
     stretches: bool = True
     end: Point | None = None
     z: Direction | None = None
+    allowable_stress: Modulus | None = None
 
 
 class PointSpringSection(Section):
@@ -454,6 +457,12 @@ class RatingsFile(Section):
     """The ratings of a file."""
 
     rating: dict[str, RatingSection] = {}
+
+
+class FlexibleFile(Section):
+    """The elastic links of a file."""
+
+    flexible: dict[str, FlexibleSection] = {}
 
 
 _SECTIONS: dict[str, type[Section]] = {

@@ -22,6 +22,7 @@ from linkwise._core import InputError
 from linkwise.base import AnyArray, Array
 from linkwise.io import writing
 from linkwise.view import arrows
+from linkwise.view.beams import Beams, rows_of
 from linkwise.view.live import View
 from linkwise.view.load_plot import lines_of
 from linkwise.view.panel import legend
@@ -57,7 +58,8 @@ class Animation(NamedTuple):
     poses: (frames, n, 7: position, quaternion with its scalar first) of the joints' places, then of
     those links' frames that are not one of them; link_poses: where each link's is in there;
     loads: (frames, causes, n_joints, 6) of the causes named; known: (frames or 1, n_joints, 2)
-    which forces and moments are determinate, None: all.
+    which forces and moments are determinate, None: all; beams: (frames, pieces, 9) of elastic
+    links.
     """
 
     times: Array
@@ -66,6 +68,7 @@ class Animation(NamedTuple):
     loads: npt.NDArray[np.float32]
     causes: list[str]
     known: AnyArray | None = None
+    beams: npt.NDArray[np.float32] = np.zeros((0, 0, 9), dtype=np.float32)
 
 
 class Blob:
@@ -91,7 +94,7 @@ class Blob:
         out = bytearray(len(head).to_bytes(8, "little") + head)
         for part in self.parts:
             out += bytes(-len(out) % 8)
-            out += part.cast("B")
+            out += part.cast("B") if part.nbytes else b""
         return base64.b64encode(gzip.compress(out, 6)).decode("ascii")
 
 
@@ -169,7 +172,9 @@ def _still(source: Source) -> Animation:
     poses, loads = _poses(model, places, q, where)[None], pose.loads(q)[None, None]
     known = None if source.known is None else source.known.at(q)[None]
     still = poses.astype(np.float32), where, loads.astype(np.float32)
-    return Animation(np.zeros(1), *still, [], known)
+    bent = Beams(model).at(_core.link_poses(model, q), q)
+    beams = np.zeros((1, 0, 9)) if bent is None else rows_of(bent)[None]
+    return Animation(np.zeros(1), *still, [], known, beams.astype(np.float32))
 
 
 def _film(source: Source) -> Animation:
@@ -181,18 +186,25 @@ def _film(source: Source) -> Animation:
     n_joints = len(places.names)
     where = _link_poses(model, places, recording.position(0))
     n_poses = len(_poses(model, places, recording.position(0), where))
-    chosen = frame_samples(recording.times, 4 * (7 * n_poses + 6 * parts * n_joints))
+    bending = Beams(model)
+    floats = 7 * n_poses + 6 * parts * n_joints + 9 * bending.count
+    chosen = frame_samples(recording.times, 4 * floats)
     poses = np.empty((chosen.size, n_poses, 7), dtype=np.float32)
     loads = np.empty((chosen.size, parts, n_joints, 6), dtype=np.float32)
+    beams = np.empty((chosen.size, bending.count, 9), dtype=np.float32)
     for k, sample in enumerate(chosen):
-        poses[k] = _poses(model, places, recording.position(sample), where)
+        q = recording.position(sample)
+        poses[k] = _poses(model, places, q, where)
+        bent = bending.at(_core.link_poses(model, q), q)
+        if bent is not None:
+            beams[k] = rows_of(bent)
         if parts and not causes:
             loads[k, 0] = recording.load(sample)
     if causes:
         assert recording.causes is not None
         loads[:] = recording.causes.shares(chosen)[:, :, : loads.shape[2]]
     known = _known(source, chosen) if parts else None
-    return Animation(recording.times[chosen], poses, where, loads, causes, known)
+    return Animation(recording.times[chosen], poses, where, loads, causes, known, beams)
 
 
 def _known(source: Source, samples: Any) -> AnyArray | None:
@@ -229,6 +241,8 @@ def _content(source: Source, scene: Scene, animation: Animation) -> dict[str, An
         "times": [float(t) for t in animation.times],
         "poses": animation.poses,
         "loads": animation.loads,
+        "beams": animation.beams,
+        "largestBending": scene.bends.largest,
         "causes": animation.causes,
         "chosen": chosen,
         "jointNames": names,

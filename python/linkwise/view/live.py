@@ -6,11 +6,12 @@ import threading
 import time as clock
 import webbrowser
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from linkwise.base import lengths
+from linkwise.view.beams import bend_legend
 from linkwise.view.joint_sliders import JointSliders
 from linkwise.view.known import elsewhere
 from linkwise.view.load_plot import LoadPlot
@@ -81,6 +82,10 @@ class View:
             )
         if recording is None or recording.has_loads:
             self._add_loads(server, recording, by_rating)
+        self._bends: Any = None
+        if self.scene.beams.count:
+            with server.gui.add_folder("Flexible links"):
+                self._bends = server.gui.add_html(bend_legend(self.scene.bends.largest))
         add_show_folder(server, self.scene, self._requests)
 
     def _add_loads(
@@ -155,7 +160,11 @@ class View:
         )
         self._largest = (largest[0], largest[1])
         self.scene.style.largest = self._largest
-        self.scene.show(self.scene.at(q, loads))
+        snapshot = self.scene.at(q, loads)
+        if snapshot.beams is not None:
+            self.scene.bends.largest = float(snapshot.beams.moments.max())
+            self._bends.content = bend_legend(self.scene.bends.largest)
+        self.scene.show(snapshot)
         self._legend.content = legend(self._largest, self.scene.style.use is not None)
         self._tell("held still: ", loads[self._joint], self._pose.told)
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from linkwise.base import AnyArray, Array
-from linkwise.view.arrows import NOTHING, in_world, instances
+from linkwise.view.arrows import NOTHING, colors_of, in_world, instances
 from linkwise.view.shapes import quaternions, turning_z_to
 
 if TYPE_CHECKING:
@@ -23,15 +23,28 @@ Indices = npt.NDArray[np.int64]
 
 
 @dataclass
+class BentBeams:
+    """The pieces at one instant: middles (n, 3) [m], rotations (n, 3, 3) whose columns are y and z
+    of the section and the direction of the piece, their lengths (n,) [m], and the largest bending
+    moments (n,) [N m] on them."""
+
+    middles: Array
+    rotations: Array
+    lengths: Array
+    moments: Array
+
+
+@dataclass
 class Snapshot:
     """The machine at one instant: frames of links (n, 4, 4), of joints as `Places` has them,
-    loads (n_joints, 6) of all joints with a load, and which forces and moments (n_joints, 2) of
-    them are determinate (None: all)."""
+    loads (n_joints, 6) of all joints with a load, which forces and moments (n_joints, 2) of
+    them are determinate (None: all), and elastic links (None: there are none)."""
 
     links: Array
     joints: Array
     loads: Array | None
     known: AnyArray | None = None
+    beams: BentBeams | None = None
 
 
 @dataclass
@@ -45,6 +58,13 @@ class LoadStyle:
     largest: tuple[float, float]
     longest: float
     use: RatingUse | None = None
+
+
+@dataclass
+class BendStyle:
+    """largest: the bending moment [N m] of the last colour."""
+
+    largest: float = 0.0
 
 
 class Placement(Protocol):
@@ -165,6 +185,33 @@ class Loads:
     def plan(self) -> dict[str, Any]:
         plan = {"kind": "loads", "half": self.half, "joints": self.joints}
         return {**plan, "known": int(self.known)}
+
+
+@dataclass
+class Bending:
+    """Pieces of elastic links; scales (n, 2): of the group's mesh along y and z."""
+
+    pieces: npt.NDArray[np.int64]
+    scales: Array
+    style: BendStyle
+
+    def __call__(self, snapshot: Snapshot) -> dict[str, Any]:
+        beams = snapshot.beams
+        if beams is None:
+            return {}
+        here = self.pieces
+        share = np.zeros(here.size)
+        if self.style.largest > 0:
+            share = beams.moments[here] / self.style.largest
+        return {
+            "batched_positions": beams.middles[here],
+            "batched_wxyzs": quaternions(beams.rotations[here]),
+            "batched_scales": np.column_stack([self.scales, np.maximum(beams.lengths[here], 1e-9)]),
+            "batched_colors": colors_of(share),
+        }
+
+    def plan(self) -> dict[str, Any]:
+        return {"kind": "bending", "pieces": self.pieces, "sizes": self.scales}
 
 
 @dataclass

@@ -122,6 +122,21 @@
 
     marks: ({points}) => ({batched_positions: points}),
 
+    bending({beams}, layer, style) {
+      const n = layer.pieces.length;
+      const positions = new Float32Array(3 * n), wxyzs = new Float32Array(4 * n);
+      const scales = new Float32Array(3 * n), colors = new Uint8Array(3 * n);
+      for (let k = 0; k < n; k++) {
+        const piece = beams.subarray(9 * layer.pieces[k], 9 * layer.pieces[k] + 9);
+        positions.set(piece.subarray(0, 3), 3 * k);
+        wxyzs.set(piece.subarray(3, 7), 4 * k);
+        scales.set([layer.sizes[2 * k], layer.sizes[2 * k + 1], Math.max(piece[7], NOTHING)], 3 * k);
+        mix(colors, k, style.colors.size, style.bending > 0 ? piece[8] / style.bending : 0);
+      }
+      return {batched_positions: positions, batched_wxyzs: wxyzs, batched_scales: scales,
+        batched_colors: colors};
+    },
+
     loads(moment, layer, style) {
       const {poses, loads, known} = moment, {half, joints} = layer, n = joints.length;
       const points = new Float32Array(3 * n);
@@ -198,7 +213,7 @@
       this.playing = this.end > this.start;
       this.chosen = new Set(data.chosen);
       this.style = {longest: data.longest, largest: data.largest, byRating: data.byRating,
-        rating: data.rating, colors: data.colors};
+        rating: data.rating, colors: data.colors, bending: data.largestBending};
       this.joint = 0;
       this.frame = -1;
       this.told = -Infinity;
@@ -287,14 +302,16 @@
     }
 
     moment(frame) {
-      const {poses, times} = this.data, size = poses.length / times.length;
+      const {poses, beams, times} = this.data, size = poses.length / times.length;
+      const width = beams.length / times.length;
       const here = poses.subarray(size * frame, size * (frame + 1));
       const points = new Float32Array(3 * this.n);
       for (let k = 0; k < this.n; k++) {
         for (let c = 0; c < 3; c++) points[3 * k + c] = here[7 * k + c];
       }
       const loads = this.parts ? this.loadsAt(frame) : null;
-      return {poses: here, points, loads, known: this.knownAt(frame)};
+      const bent = beams.subarray(width * frame, width * (frame + 1));
+      return {poses: here, points, loads, known: this.knownAt(frame), beams: bent};
     }
 
     // Which forces and moments are determinate at a frame, null: all.

@@ -13,8 +13,11 @@ from linkwise import _core
 from linkwise.base import AnyArray, Array
 from linkwise.io.complaint import shorten
 from linkwise.io.urdf_visuals import Visual
+from linkwise.view.beams import Beams
 from linkwise.view.meshes import load_mesh
 from linkwise.view.placement import (
+    Bending,
+    BendStyle,
     Fixed,
     Following,
     Lines,
@@ -46,6 +49,7 @@ if TYPE_CHECKING:
 
 _TONES = np.array([[86, 112, 140], [150, 170, 190]], dtype=np.uint8)
 _ROD_TONE, _MARK_TONE, _BOX_TONE = (120, 132, 146), (52, 58, 66), (230, 150, 60)
+_SLENDEREST = 0.004  # of the machine's size: a thinner beam would not be seen
 _PLAIN = (0.62, 0.66, 0.70, 1.0)
 _MANY = 1500  # joints, above which marks at every joint only hide the links
 _SPARSE_LOADS, _SPARSE_POINTS = 60, 300  # of a machine with more: what a processor draws in time
@@ -77,6 +81,8 @@ class Scene:
         self._model = model = source.model
         self._inboard = np.array(model.joint_parents, dtype=int)
         self.places = Places(model)
+        self.beams, self.bends = Beams(model), BendStyle()
+        self._bent = set(model.beam_lengths)
         self._few = model.n_joints <= _MANY
         self.layers: dict[str, list[Layer]] = defaultdict(list)
         self.joint_marks: Any = None
@@ -90,11 +96,13 @@ class Scene:
             last = source.recording.times.size - 1
             some = np.unique(np.linspace(0, last, _LOOKED_AT).astype(int))
             snapshots = [self.at(source.recording.position(k), None) for k in some]
+            self.bends.largest = self.beams.largest(source.recording.positions())
         self.center, self.size = _extent(snapshots, model)
         self.style = LoadStyle((0.0, 0.0), _ARROW_SHARE * self.size)
         self.toggles: dict[str, bool] = {}
         self._add_visuals(source)
         self._add_shapes(bare="Meshes" not in self.toggles)
+        self._add_beams()
         if source.recording is None or source.recording.has_loads:
             shown = source.recording is not None
             peaks = np.zeros(len(self.places.names))
@@ -110,7 +118,8 @@ class Scene:
     def at(self, q: Array, loads: Array | None) -> Snapshot:
         links = _core.link_poses(self._model, q)
         known = None if loads is None or self._known is None else self._known.at(q)
-        return Snapshot(links, self.places.frames(links, q), loads, known)
+        beams = self.beams.at(links, q)
+        return Snapshot(links, self.places.frames(links, q), loads, known, beams)
 
     @property
     def known(self) -> AnyArray | None:
@@ -168,7 +177,7 @@ class Scene:
         index = {name: k for k, name in enumerate(self._model.link_names)}
         groups: dict[tuple[str, Path | None, Any], list[Visual]] = defaultdict(list)
         for visual in source.appearance.visuals:
-            if visual.link in index:
+            if visual.link in index and visual.link not in self._bent:
                 scale = visual.size if visual.shape == "mesh" else None
                 groups[visual.shape, visual.path, (scale, visual.color)].append(visual)
         for (shape, path, _), visuals in groups.items():
@@ -222,6 +231,7 @@ class Scene:
         solid = np.flatnonzero(boxes.edges.max(axis=1, initial=0.0) > 0)
         near = solid[_stays_near(self._snapshot, model, boxes.edges, offsets)[solid]]
         near = near[model.link_masses[near] > _LIGHTEST * model.link_masses.sum()]
+        near = near[[model.link_names[k] not in self._bent for k in near]]
         for toggle, chosen, shown, style in (
             (links, near, bare and few, {"batched_colors": _TONES[near % 2]}),
             ("Inertia boxes", solid, False, {"batched_colors": _BOX_TONE, "opacity": 0.35}),
@@ -234,7 +244,8 @@ class Scene:
                 self.layers[toggle].append(Layer(handle, Following(chosen, offsets[chosen])))
         outboard = np.flatnonzero(inboard >= 0)
         thick = self._thickness()
-        spans = np.concatenate([np.column_stack([inboard[outboard], outboard]), self.places.spans])
+        stiff = outboard[[model.joint_types[k] != "elastic" for k in outboard]]
+        spans = np.concatenate([np.column_stack([inboard[stiff], stiff]), self.places.spans])
         if len(spans):
             handle = self._add(
                 links,
@@ -281,6 +292,25 @@ class Scene:
                 batched_colors=_MARK_TONE,
             )
             self.layers["Rods"].append(Layer(handle, Spanning(rods[:, 0], rods[:, 1], radius)))
+
+    def _add_beams(self) -> None:
+        """Elastic links as they bend, in place of the shapes that their file gives them."""
+        thinnest = _SLENDEREST * self.size
+        for mesh, is_round, unit in ((unit_cylinder(12), True, 0.5), (unit_box(), False, 1.0)):
+            pieces = np.flatnonzero(self.beams.round == is_round)
+            if not pieces.size:
+                continue
+            handle = self._add(
+                "Flexible links",
+                True,
+                mesh,
+                pieces.size,
+                batched_scales=np.ones((pieces.size, 3)),
+                batched_colors=np.zeros((pieces.size, 3), dtype=np.uint8),
+            )
+            scales = unit * np.maximum(self.beams.sizes[pieces], thinnest)
+            place = Bending(pieces, scales, self.bends)
+            self.layers["Flexible links"].append(Layer(handle, place))
 
     def _thickness(self) -> float:
         """Radius of the joint marks: small beside the links and, of short chains, the machine."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ from linkwise.io.load import load
 from linkwise.io.urdf_visuals import Appearance, read_appearance
 from linkwise.loads.determinate import FEW_ROWS, loop_rows
 from linkwise.loads.extremes import loads_at_peaks, missed_peaks
-from linkwise.loads.samples import held_model, model_of, rows
+from linkwise.loads.samples import blocks, held_model, model_of, rows
 from linkwise.loads.undecided import undecided_loads
 from linkwise.notes import plain_warnings, warnings_of
 from linkwise.record.model import read_model
@@ -111,6 +111,11 @@ class Recording:
     def position(self, sample: int) -> Array:
         row = self._read(sample)
         return np.asarray(self._positions[row])
+
+    def positions(self) -> Iterator[Array]:
+        """Positions (time, nq) of all samples, block by block."""
+        for block in blocks(self._run, self._row_bytes):
+            yield rows(self._run, "position", block)
 
     def load(self, sample: int) -> Array:
         """Loads (n_joints, 6) in the joint frames, of the chosen causes."""

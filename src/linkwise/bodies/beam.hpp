@@ -36,6 +36,9 @@ struct BeamProperties {
   double stretches;           ///< 1: it has a coordinate along x, 0: it is not extensible
   double axes[9];             ///< the beam's axes as columns, x along it, in the link's frame
   double start[3];            ///< of the beam, in the link's frame, m
+  double area;                ///< of the section, m2
+  double width, height;       ///< of the section's outside along y and z, m; 0: not known
+  double round;               ///< 1: the outside is a circle
 };
 inline constexpr int most_interior_modes = 4;
 

@@ -1,5 +1,7 @@
 #include "linkwise/dynamics/section_loads.hpp"
 
+#include <algorithm>
+
 #include "linkwise/base/error.hpp"
 #include "linkwise/model/validate.hpp"
 
@@ -36,28 +38,83 @@ Vec3<double> centre(const BeamModes& of, const BeamModes::Station& at,
   return beam::point(of, at, own, none).r;
 }
 
+/// The beam that a section is on. Throws InputError where the body is no beam or the section beside
+/// it.
+const Beam& beam_at(const Model& model, const BeamSection& section) {
+  const auto [body, x] = section;
+  const Beam* beam = beam_of(model, body);
+  if (!beam)
+    throw InputError("link '" + model.body_name(body) + "'" + model.where() +
+                     " is no elastic beam and has no loads of sections; name one that is");
+  const double L = beam->modes->of.length;
+  if (!(x >= 0 && x <= L * (1 + 1e-12)))
+    throw InputError("section at " + number_text(x) + " m is not on link '" +
+                     model.body_name(body) + "'" + model.where() + ", which is " + number_text(L) +
+                     " m long; give a place on it");
+  return *beam;
+}
+
+/// Body's axes along the beam -> those of the section as bent.
+Transform<double> section_pose(const BeamModes& of, const BeamModes::Station& at,
+                               const OwnState<double>& own) {
+  const Vec3<double> theta = turned(of, at.x, own.q);
+  return {elastic_port::rotation(theta, TurnSeries<double>(dot(theta, theta))),
+          centre(of, at, own)};
+}
+
+/// What coordinates say of the force along x and of the moments, each with its share of damping.
+void strain_loads(const BeamModes& of, double x, const OwnState<double>& own, double* sum) {
+  std::fill(sum, sum + 4, 0.0);
+  for (int k = 0; k < of.n; ++k) {
+    const double strain = own.q[k] + of.damping[k] / of.stiffness[k] * own.rate(k);
+    if (k < of.twist()) {
+      sum[0] -= of.of.EA / of.of.length * strain;
+    } else if (k == of.twist()) {
+      sum[1] -= of.of.GJ / of.of.length * strain;
+    } else {
+      const int p = k < of.first(1) ? 0 : 1;
+      const double bend = of.shape(p, k - of.first(p), x, 2) * strain;
+      sum[p == 0 ? 3 : 2] += p == 0 ? -of.of.EIz * bend : of.of.EIy * bend;
+    }
+  }
+}
+
 }  // namespace
 
 SectionLoads::SectionLoads(const Model& model, std::vector<BeamSection> sections)
     : model_(model), dynamics_(model) {
-  for (const auto [body, x] : sections) {
-    const Beam* beam = beam_of(model, body);
-    if (!beam)
-      throw InputError("link '" + model.body_name(body) + "'" + model.where() +
-                       " is no elastic beam and has no loads of sections; name one that is");
-    const BeamModes& of = *beam->modes;
+  for (const BeamSection& section : sections) {
+    const auto [body, x] = section;
+    const Beam& beam = beam_at(model, section);
+    const BeamModes& of = *beam.modes;
     const double L = of.of.length;
-    if (!(x >= 0 && x <= L * (1 + 1e-12)))
-      throw InputError("section at " + number_text(x) + " m is not on link '" +
-                       model.body_name(body) + "'" + model.where() + ", which is " +
-                       number_text(L) + " m long; give a place on it");
-    Cut cut{beam, body, -1, of.station(std::min(x, L)), {}};
+    Cut cut{&beam, body, -1, of.station(std::min(x, L)), {}};
     for (int j = 0; j < model.n_joints(); ++j) {
       const BodyTopology& carried = model.topology[model.joints[j].body];
       if (carried.parent == body && on_port(model, carried)) cut.joint = j;
     }
     cut.outboard = of.stations_from(std::min(x, L));
     cuts_.push_back(std::move(cut));
+  }
+}
+
+BentSections::BentSections(const Model& model, const std::vector<BeamSection>& sections)
+    : model_(model) {
+  for (const BeamSection& section : sections) {
+    const Beam& beam = beam_at(model, section);
+    const double x = std::min(section.x, beam.modes->of.length);
+    cuts_.push_back({&beam, section.body, beam.modes->station(x)});
+  }
+}
+
+void BentSections::evaluate(const double* q, Transform<double>* poses, double* elastic) const {
+  SweepInput<double> in;
+  in.q = q;
+  for (size_t i = 0; i < cuts_.size(); ++i) {
+    const auto& [beam, body, at] = cuts_[i];
+    const OwnState<double> own = own_state(model_, in, body);
+    poses[i] = section_pose(*beam->modes, at, own) * beam->to_beam;
+    strain_loads(*beam->modes, at.x, own, elastic + 4 * i);
   }
 }
 
@@ -107,25 +164,11 @@ void SectionLoads::evaluate(const SweepInput<double>& in, const double* du,
     const double* end = joint_loads + 6 * cut.joint;
     w += transpose_times(elastic_pose(of.port, own.q),
                          Force<double>{{end[0], end[1], end[2]}, {end[3], end[4], end[5]}});
-    const Vec3<double> theta = turned(of, cut.at.x, own.q);
-    const Transform<double> X{elastic_port::rotation(theta, TurnSeries<double>(dot(theta, theta))),
-                              centre(of, cut.at, own)};
+    const Transform<double> X = section_pose(of, cut.at, own);
     const auto here = to_array(inverse_transpose_times(X, w));
     std::copy(here.begin(), here.end(), loads + 6 * i);
-    // What the coordinates say, each with its share of damping.
-    double sum[4] = {};
-    for (int k = 0; k < of.n; ++k) {
-      const double strain = own.q[k] + of.damping[k] / of.stiffness[k] * own.rate(k);
-      if (k < of.twist()) {
-        sum[0] -= of.of.EA / of.of.length * strain;
-      } else if (k == of.twist()) {
-        sum[1] -= of.of.GJ / of.of.length * strain;
-      } else {
-        const int p = k < of.first(1) ? 0 : 1;
-        const double bend = of.shape(p, k - of.first(p), cut.at.x, 2) * strain;
-        sum[p == 0 ? 3 : 2] += p == 0 ? -of.of.EIz * bend : of.of.EIy * bend;
-      }
-    }
+    double sum[4];
+    strain_loads(of, cut.at.x, own, sum);
     if (!of.stretches) sum[0] = here[0];  // it has no strain that would say
     std::copy(sum, sum + 4, elastic + 4 * i);
   }

@@ -44,4 +44,26 @@ class SectionLoads {
   std::vector<Cut> cuts_;
 };
 
+/// Where sections are, and what their strains say, of positions alone.
+class BentSections {
+ public:
+  /// Throws as SectionLoads does.
+  BentSections(const Model& model, const std::vector<BeamSection>& sections);
+
+  /// `poses` [sections]: body's frame -> the section's as bent, x along the beam; `elastic`
+  /// [sections][4]: the force along x and the moments about x, y, z that strains say, signed as
+  /// loads of sections.
+  void evaluate(const double* q, Transform<double>* poses, double* elastic) const;
+
+ private:
+  struct Cut {
+    const Beam* beam;
+    int body;
+    BeamModes::Station at;
+  };
+
+  const Model& model_;
+  std::vector<Cut> cuts_;
+};
+
 }  // namespace linkwise

@@ -164,6 +164,10 @@ ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
   of.damping_ratio = flexible.damping;
   of.interior_modes = flexible.interior_modes;
   of.stretches = flexible.stretches;
+  of.area = flexible.area;
+  of.width = flexible.width;
+  of.height = flexible.height;
+  of.round = flexible.round;
   std::copy(axes.m, axes.m + 9, of.axes);
   set_straight(*found, of, axes);
   const std::string tip = name + ":end";

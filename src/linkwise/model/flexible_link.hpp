@@ -12,6 +12,8 @@ struct FlexibleLink {
   std::string link;
   double E, G;                    ///< moduli, Pa
   double area, Iy, Iz, J;         ///< of the section, m2 and m4; y and z are the beam's axes
+  double width = 0, height = 0;   ///< of the section's outside along y and z, m; 0: not known
+  bool round = false;             ///< the outside is a circle
   std::optional<double> density;  ///< kg/m3; else the link's mass is spread over its length
   double damping = 0;             ///< ratio of every mode
   int bodies = 1, interior_modes = 2;

@@ -5,6 +5,7 @@ GPU a frame can take a second, and on a busy machine many.
 """
 
 import io
+import re
 import time
 
 import numpy as np
@@ -359,3 +360,33 @@ def test_ten_thousand_links_play_and_take_no_more_messages_than_six(run_path, tm
     many = write_html(source, tmp_path / "many.html").path
     assert 5 < messages_of_a_picture(page, many) <= allowed
     assert_same_instances(page, source, 15)
+
+
+def test_exported_flexible_links_bend_as_those_of_the_view(tmp_path, page):
+    """Pieces follow the bent link, round and box-shaped ones, and the legend has the moment."""
+    path = tmp_path / "crane.zarr"
+    builder = lw.ModelBuilder("crane")
+    for name, mass in (("tower", 0), ("jib", 60.0), ("rope", 4.0), ("load", 50.0)):
+        builder.add_link(name, mass=mass, inertia=np.eye(3) * bool(mass))
+    builder.add_joint("slew", "revolute", "tower", "jib", axis=(0, 0, 1), translation=(0, 0, 2))
+    builder.add_joint("hook", "revolute", "jib", "rope", axis=(0, 1, 0), translation=(3, 0, 0))
+    builder.add_joint("shackle", "fixed", "rope", "load", translation=(0, 0, -1))
+    steel = {"E": 210e9, "G": 80e9, "damping": 0.05, "interior_modes": 0, "stretches": False}
+    builder.make_flexible("jib", section=lw.Section.box(0.08, 0.1, 0.004), **steel)
+    builder.make_flexible("rope", section=lw.Section.round(0.03), **steel)
+    lw.simulate(
+        builder.build(),
+        duration=0.4,
+        every=0.02,
+        drives={"slew": lw.Torque(500)},
+        output=path,
+    )
+    source = open_source(path, Options())
+    written = write_html(source, tmp_path / "crane.html")
+    open_page(page, written.path.as_uri())
+    page.get_by_role("button", name="Pause").click()
+    for sample in (0, 7, 20):
+        assert_same_instances(page, source, sample)
+    assert page.get_by_role("checkbox", name="Flexible links").count() == 1
+    page.get_by_text("by the curvature of the bent shape").wait_for()
+    assert page.get_by_text(re.compile(r"^bending moment \d.* N m$")).count() == 1
