@@ -162,6 +162,7 @@ LOADS = {
     "in_frame": "frame point:vector fixed_in:frame",
     "section_loads": "*link n:count",
     "section_summary": "*link n:count",
+    "section_deflections": "*link n:count",
     "section_split": "*link n:count",
     "section_damage": "*link n:count exponents:times repetitions:number",
     "cycles": "*joint *quantity",

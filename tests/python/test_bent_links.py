@@ -240,6 +240,40 @@ def test_margins_are_of_the_peaks_with_their_errors(run):
     assert float(found.use[0]) == pytest.approx(abs(float(summary.peak.sel(quantity="fz"))) / 1e4)
 
 
+def test_deflections_are_where_the_sections_are(run):
+    """Straight line and deflection put each section where its frame is; the end's turn is that of
+    the elastic joints."""
+    found = lw.loads.section_deflections(run, "jib", 5)
+    model, q = run.load_model(), np.asarray(run.position)
+    frames = section_frames(model, *spread(row_of(model, "jib"), model.beam_lengths, 5)[:2], q)[0]
+    straight = np.zeros((5, 3))
+    straight[:, 0] = found.x
+    local = straight + found.deflection.values
+    start = frames[:, 0]
+    world = start[:, None, :3, 3] + np.einsum("tij,tsj->tsi", start[:, :3, :3], local)
+    assert world == pytest.approx(found.point.values, abs=1e-12)
+    end = lw.link_poses(model, q)[:, model.link_names.index("jib:end")]
+    assert found.point[:, -1].values == pytest.approx(end[:, :3, 3], abs=1e-12)
+    turns = found.turn[:, -1].values
+    for turn, begun, ended in zip(turns[5::20], start[5::20], end[5::20], strict=True):
+        angle = np.linalg.norm(turn)
+        K = np.cross(np.eye(3), turn / angle)
+        R = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+        assert pytest.approx(begun[:3, :3].T @ ended[:3, :3], abs=1e-12) == R
+    assert abs(found.deflection[:, 0].values).max() == 0
+
+
+def test_strain_energy_is_the_work_that_bent_it():
+    """F^2 L^3 / 6 EI of a cantilever at rest, half of force times deflection."""
+    from linkwise.loads.deflections import strain_energy
+
+    for bodies in (1, 3):
+        model = cantilever(mass=1e-9, bodies=bodies, tip_mass=0.1)
+        force = 0.1 * 9.81
+        found = strain_energy(model, "beam", bodies, at_rest(model))
+        assert found == pytest.approx(force**2 * LENGTH**3 / (6 * E * BOX.Iy), rel=1e-5)
+
+
 def test_general_sections_have_stresses_where_their_sizes_are_given():
     plain = {"area": 0.01, "Iy": 2e-4, "Iz": 1e-4, "J": 1e-4}
     drives = {"duration": 0.02, "every": 0.01, "drives": {"slew": lw.Torque(4000)}}
@@ -259,6 +293,7 @@ def test_general_sections_have_stresses_where_their_sizes_are_given():
 def test_bad_input_is_one_line(run):
     for call, message in (
         (lambda: lw.loads.section_summary(run, "tower"), "link 'tower' is not elastic; the"),
+        (lambda: lw.loads.section_deflections(run, "jib", True), "n: is True; give a number"),
         (lambda: lw.loads.section_split(run, "jip"), "did you mean 'jib'"),
         (lambda: lw.loads.section_damage(run, "jib", 1), "n: is 1; give a number of sections"),
         (lambda: lw.loads.section_loads(run, 3), "link: is 3; give the name"),

@@ -6,6 +6,7 @@ The run must hold `joint_load`; what else a function needs is in its docstring.
 
 from linkwise.loads.causes import split, split_at_peaks
 from linkwise.loads.certainty import bounds
+from linkwise.loads.deflections import section_deflections
 from linkwise.loads.energy import energy_balance
 from linkwise.loads.engineering import QUANTITIES, quantities
 from linkwise.loads.fatigue import cycles, damage_equivalent, load_duration, spectrum
@@ -35,6 +36,7 @@ __all__ = [
     "peak_loads",
     "quantities",
     "section_damage",
+    "section_deflections",
     "section_loads",
     "section_margins",
     "section_split",

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _AXES = "axes of the bent section: x along the beam, y and z its own"
 _SIGN = "inboard part on outboard part"
-_STATE = ("position", "velocity", "acceleration", "joint_load")
+STATE = ("position", "velocity", "acceleration", "joint_load")
 
 
 class Sections:
@@ -35,7 +35,7 @@ class Sections:
         self.run, self.model = run, model_of(run, None)
         row = row_of(self.model, link)
         self.links, self.places, self.x = spread(row, self.model.beam_lengths, check_count(n))
-        need_whole(run, self.model, *_STATE)
+        need_whole(run, self.model, *STATE)
         self.link, self.n = link, len(self.links)
         self.section: dict[str, Any] = _core.beam_properties(self.model)[link]
         self.times: Array = np.asarray(run.dataset["time"], dtype=float)
@@ -49,7 +49,7 @@ class Sections:
     def blocks(self) -> Iterator[tuple[slice, Array, Array]]:
         """Samples with their loads and discretisation errors, (time, section, 6) each."""
         for block in blocks(self.run, self.row_bytes):
-            q, v, a, joints = (rows(self.run, name, block) for name in _STATE)
+            q, v, a, joints = (rows(self.run, name, block) for name in STATE)
             load, strain = self.loads(q, v, a, joints)
             error = np.full(load.shape, np.nan)
             error[..., [0, 3, 4, 5]] = np.abs(load[..., [0, 3, 4, 5]] - strain)
@@ -179,7 +179,7 @@ def section_split(run: RunLike, link: str, n: int = 11) -> xr.DataArray:
     made = Split(run, "motion", of.model)
     found = np.empty((of.times.size, len(made.names), of.n, 6))
     for block in blocks(run, of.row_bytes * max(1, len(made.names))):
-        q, v, a = (rows(run, name, block) for name in _STATE[:3])
+        q, v, a = (rows(run, name, block) for name in STATE[:3])
         shares = made.shares(block)
         still = np.zeros_like(a)
         for k, cause in enumerate(made.names):

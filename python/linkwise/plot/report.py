@@ -16,6 +16,7 @@ from linkwise.loads.extremes import what_samples_miss
 from linkwise.loads.fatigue import damage_equivalent
 from linkwise.loads.peaks import envelope
 from linkwise.notes import recorded_warnings
+from linkwise.plot.inside_figures import PEAK_HEADINGS, inside, peak_rows
 from linkwise.plot.report_figures import energy_figure, joint_figures, packed
 
 if TYPE_CHECKING:
@@ -47,7 +48,8 @@ _SCRIPT = """
 const figures = JSON.parse(document.getElementById("figures").textContent);
 const options = {responsive: true, displaylogo: false};
 // Curves over time say so instead of each holding the times.
-for (const figure of [...Object.values(figures.joints).flat(), ...figures.energy]) {
+for (const figure of [...Object.values(figures.joints).flat(),
+    ...Object.values(figures.inside).flat(), ...figures.energy]) {
   for (const trace of figure.data) if (trace.x === "times") trace.x = figures.times;
 }
 function draw(place, list) {
@@ -60,10 +62,12 @@ function draw(place, list) {
     Plotly.newPlot(boxes[k], figure.data, figure.layout, options);
   });
 }
-const chooser = document.getElementById("joint");
-const place = document.getElementById("joint-figures");
-chooser.addEventListener("change", () => draw(place, figures.joints[chooser.value]));
-draw(place, figures.joints[chooser.value]);
+for (const [id, made] of [["joint", figures.joints], ["link", figures.inside]]) {
+  const chooser = document.getElementById(id), place = document.getElementById(`${id}-figures`);
+  if (!chooser) continue;
+  chooser.addEventListener("change", () => draw(place, made[chooser.value]));
+  draw(place, made[chooser.value]);
+}
 draw(document.getElementById("energy-figures"), figures.energy);
 """
 
@@ -260,6 +264,26 @@ def script_json(value: Any) -> str:
     return json.dumps(value).replace("<", "\\u003c")
 
 
+def _inside(summaries: dict[str, Any], missing: str) -> str:
+    """Peaks inside flexible links, and the place of their figures."""
+    if missing:
+        return f"<h2>Inside flexible links</h2>{_note(missing)}"
+    if not summaries:
+        return ""
+    rows = [_row(cells) for link, one in summaries.items() for cells in peak_rows(link, one)]
+    options = "".join(f"<option value='{escape(n)}'>{escape(n)}</option>" for n in summaries)
+    about = (
+        "Of the samples: what the inboard part puts on the outboard part, in the axes of the bent "
+        "section; tension is a negative fx, and a positive stress. Areas hold the whole run, lines "
+        "are of the instant at which the largest load is in the figure."
+    )
+    return (
+        f"<h2>Inside flexible links</h2>{_note(about)}{_table(PEAK_HEADINGS, rows)}"
+        f"<label>Link <select id='link'>{options}</select></label>"
+        "<div id='link-figures' class='grid'></div>"
+    )
+
+
 def write_report(
     run: RunLike, path: str | os.PathLike[str], found: dict[str, Any], model: Model | None = None
 ) -> Path:
@@ -281,7 +305,9 @@ def write_report(
     ranked = [names[k] for k in np.lexsort((-force, ~known))[:MOST_JOINTS]]
     drawn = [name for name in names if name in set(ranked)]
     every = max(1, -(-run.dataset.sizes["time"] // MOST_SAMPLES))
+    within, summaries, missing = inside(run, every)
     content = {
+        "inside": within,
         "times": packed(run.dataset["time"].values[::every]),
         "joints": joint_figures(run, drawn, every, model),
         "energy": energy_figure(run, every, model),
@@ -322,6 +348,7 @@ def write_report(
         )
         + f"<label>Joint <select id='joint'>{chooser}</select></label>",
         "<div id='joint-figures' class='grid'></div>",
+        _inside(summaries, missing),
         "<h2>Energy and solver</h2><div id='energy-figures' class='grid'></div>",
         _health(run, limits),
         f"<h2>Scenario</h2><pre>{escape(scenario)}</pre>" if scenario else "",

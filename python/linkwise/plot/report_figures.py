@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from linkwise.loads.samples import RunLike
 
 Figure = dict[str, Any]
-_COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
+COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
 _OPEN = {"dash": "dot"}
 _NOT_KNOWN = "; dotted and in brackets: one choice of many"
 TIMES = "times"
@@ -42,7 +42,7 @@ def packed(values: npt.ArrayLike) -> dict[str, str]:
     return {"dtype": "f4", "bdata": base64.b64encode(data).decode("ascii")}
 
 
-def _layout(title: str, x: str, y: str, **more: Any) -> Figure:
+def layout_of(title: str, x: str, y: str, **more: Any) -> Figure:
     return {
         "title": {"text": title, "font": {"size": 14}, "x": 0.02},
         "xaxis": {"title": {"text": x}},
@@ -54,7 +54,7 @@ def _layout(title: str, x: str, y: str, **more: Any) -> Figure:
     }
 
 
-def _line(name: str, x: Any, y: npt.ArrayLike, **more: Any) -> Figure:
+def curve(name: str, x: Any, y: npt.ArrayLike, **more: Any) -> Figure:
     line = {"width": 1.5, **more.pop("line", {})}
     return {
         "type": "scatter",
@@ -70,7 +70,7 @@ def _dots(color: str, x: Array, y: Array) -> Figure:
     """Extremes between the samples, in the colour of their line."""
     dots = {"color": color, "size": 7}
     more = {"mode": "markers", "marker": dots, "showlegend": False}
-    return _line("extreme", packed(x), y, **more)
+    return curve("extreme", packed(x), y, **more)
 
 
 def _components(run: RunLike, joint: int) -> AnyArray:
@@ -87,17 +87,17 @@ def _histories(load: Array, run: RunLike, joint: int) -> list[Figure]:
     for k, (half, unit, components) in enumerate(HALVES):
         part = load[:, 3 * k : 3 * k + 3]
         data = []
-        for c, (name, color) in enumerate(zip(components, _COLOURS, strict=False)):
+        for c, (name, color) in enumerate(zip(components, COLOURS, strict=False)):
             line = {"color": color} | (_OPEN if open_ones[3 * k + c] else {})
             label = f"({name})" if open_ones[3 * k + c] else name
-            data.append(_line(label, TIMES, part[:, c], line=line))
+            data.append(curve(label, TIMES, part[:, c], line=line))
             data.append(_dots(color, *extremes[name]))
         some = bool(open_ones[3 * k : 3 * k + 3].any())
         line = {"color": "black"} | (_OPEN if some else {})
-        data.append(_line("(size)" if some else "size", TIMES, lengths(part), line=line))
+        data.append(curve("(size)" if some else "size", TIMES, lengths(part), line=line))
         data.append(_dots("black", peak_times, lengths(peaks[:, 3 * k : 3 * k + 3])))
         title = half.capitalize() + (_NOT_KNOWN if some else "")
-        layout = _layout(title, "time [s]", f"{half} [{unit}]")
+        layout = layout_of(title, "time [s]", f"{half} [{unit}]")
         made.append({"data": data, "layout": layout})
     return made
 
@@ -124,15 +124,15 @@ def _areas(shares: Array, causes: list[str], known: AnyArray) -> list[Figure]:
                 values = sign * np.maximum(sign * parts[:, c], 0)
                 style = {
                     "stackgroup": group,
-                    "line": {"width": 0, "color": _COLOURS[c % len(_COLOURS)]},
+                    "line": {"width": 0, "color": COLOURS[c % len(COLOURS)]},
                     "legendgroup": cause,
                     "showlegend": sign > 0,
                 }
-                data.append(_line(_shown(cause, sure), TIMES, values, **style))
+                data.append(curve(_shown(cause, sure), TIMES, values, **style))
         line = {"color": "black", **_dotted(sure)}
-        data.append(_line(_shown("total", sure), TIMES, total, line=line))
+        data.append(curve(_shown("total", sure), TIMES, total, line=line))
         title = f"{half.capitalize()} by cause" + ("" if sure else _NOT_KNOWN)
-        layout = _layout(title, "time [s]", f"{half} [{unit}]")
+        layout = layout_of(title, "time [s]", f"{half} [{unit}]")
         made.append({"data": data, "layout": layout})
     return made
 
@@ -177,10 +177,10 @@ def _spectra(run: RunLike, joint: str, half: int) -> Figure:
         surest &= sure
         values = np.maximum(found.values[1:], 1e-30)
         name, line = _shown(component, sure), _dotted(sure)
-        data.append(_line(name, packed(frequency), values, line=line))
+        data.append(curve(name, packed(frequency), values, line=line))
     density = "N²/Hz" if unit == "N" else "N² m²/Hz"
     title = f"Spectral density of the {kind}" + ("" if surest else _NOT_KNOWN)
-    layout = _layout(title, "frequency [Hz]", density)
+    layout = layout_of(title, "frequency [Hz]", density)
     layout["xaxis"]["type"] = layout["yaxis"]["type"] = "log"
     layout["yaxis"]["exponentformat"] = "power"
     return {"data": data, "layout": layout}
@@ -196,7 +196,7 @@ def _duration(run: RunLike, joint: str, model: Model) -> Figure:
     }
     sure = bool(found.coords.get("determinate", True))
     title = "Load duration" + ("" if sure else " (one choice of many)")
-    return {"data": [trace], "layout": _layout(title, "force [N]", "time [s]")}
+    return {"data": [trace], "layout": layout_of(title, "force [N]", "time [s]")}
 
 
 def joint_figures(
@@ -251,7 +251,7 @@ def _engineering(load: Array, direction: Array, half: int, known: Mapping[str, b
     found = derive(load[:, None], direction[None])
     names = _ALONG_AND_ACROSS[half]
     data = [
-        _line(
+        curve(
             _shown(name.replace("_", " "), known[name]),
             TIMES,
             found[name][:, 0],
@@ -262,7 +262,7 @@ def _engineering(load: Array, direction: Array, half: int, known: Mapping[str, b
     title = ("Force along and across the axis", "Moment about and across the axis")[half]
     title += "" if all(known[name] for name in names) else _NOT_KNOWN
     kind, unit, _ = HALVES[half]
-    return {"data": data, "layout": _layout(title, "time [s]", f"{kind} [{unit}]")}
+    return {"data": data, "layout": layout_of(title, "time [s]", f"{kind} [{unit}]")}
 
 
 def _thinned_shares(
@@ -286,21 +286,21 @@ def energy_figure(run: RunLike, every: int, model: Model | None) -> list[Figure]
     except InputError:
         return []
     lines = {
-        str(name): _line(values.attrs["long_name"], TIMES, values.values[::every])
+        str(name): curve(values.attrs["long_name"], TIMES, values.values[::every])
         for name, values in balance.data_vars.items()
     }
     residual = lines.pop("residual")
     step = [] if "step_size" not in run.dataset else [_steps(run, every)]
     return [
-        {"data": list(lines.values()), "layout": _layout("Energy", "time [s]", "energy [J]")},
-        {"data": [residual], "layout": _layout("What does not add up", "time [s]", "energy [J]")},
+        {"data": list(lines.values()), "layout": layout_of("Energy", "time [s]", "energy [J]")},
+        {"data": [residual], "layout": layout_of("What does not add up", "time [s]", "energy [J]")},
         *step,
     ]
 
 
 def _steps(run: RunLike, every: int) -> Figure:
-    layout = _layout("Integration step", "time [s]", "step [s]")
+    layout = layout_of("Integration step", "time [s]", "step [s]")
     layout["yaxis"]["type"] = "log"
     steps = run.dataset["step_size"].values[::every]
-    line = _line("step", TIMES, np.where(steps > 0, steps, np.nan))  # none before the first
+    line = curve("step", TIMES, np.where(steps > 0, steps, np.nan))  # none before the first
     return {"data": [line], "layout": layout}

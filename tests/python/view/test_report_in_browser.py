@@ -88,3 +88,37 @@ def test_chosen_joint_changes_the_figures(report, page):
     assert before.shape == after.shape
     assert (np.abs(after - before).max(axis=2) > 50).sum() > 300
     assert np.array_equal(picture(page, "Energy"), same)
+
+
+INSIDE = [
+    "Axial force along jib, at",
+    "Shear along jib, at",
+    "Torsion along jib, at",
+    "Bending along jib, at",
+    "Fibre stress along jib, at",
+    "Deflection of jib's end",
+    "Strain energy of jib",
+]
+
+
+def test_flexible_links_have_their_diagrams(tmp_path, page):
+    builder = lw.ModelBuilder("crane")
+    for name, mass in (("tower", 0), ("jib", 60.0), ("load", 50.0)):
+        builder.add_link(name, mass=mass, inertia=np.eye(3) * bool(mass))
+    builder.add_joint("slew", "revolute", "tower", "jib", axis=(0, 0, 1))
+    builder.add_joint("hook", "revolute", "jib", "load", axis=(0, 1, 0), translation=(3, 0, 0))
+    steel = {"E": 210e9, "G": 80e9, "damping": 0.05, "interior_modes": 0, "stretches": False}
+    builder.make_flexible("jib", section=lw.Section.box(0.08, 0.1, 0.004), **steel)
+    run = lw.simulate(builder.build(), duration=0.4, every=0.02, drives={"slew": lw.Torque(500)})
+    path = write_report(run, tmp_path / "report.html", {"summary": lw.loads.summary(run)})
+    page.goto(path.as_uri())
+    place = page.locator("#link-figures")
+    for title in INSIDE:
+        one = place.locator(".figure").filter(has=page.get_by_text(title))
+        one.locator("svg.main-svg").first.wait_for()
+        assert one.count() == 1, title
+    assert place.locator(".figure").count() == len(INSIDE)
+    peak = lw.loads.section_summary(run, "jib", 21).peak.sel(quantity="ny")
+    row = page.locator("tr").filter(has_text="jib: bending about y ny [N m]")
+    assert f"{float(peak):.4g}" in row.inner_text()
+    page.screenshot(path=tmp_path / "report.png", full_page=True, timeout=PATIENCE * 1000)
