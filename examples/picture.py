@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 import linkwise as lw
+from linkwise import _core
 
 # Fixed identifiers and no time stamp: the same picture gives the same file.
 mpl.rcParams |= {"svg.hashsalt": "linkwise", "svg.fonttype": "none"}
@@ -61,6 +62,8 @@ def draw_machine(axis, run, times, tips, view):
             style |= {"markersize": 0}
         for line in lines(model, poses, {j: np.append(p, 1.0) for j, p in tips.items()}):
             axis.plot(line[:, across], line[:, up], "o-", **style)
+        for line in bent_lines(model, q):
+            axis.plot(line[:, across], line[:, up], "-", color=str(grey), linewidth=1.2)
         for line in closing_lines(model, q, poses):
             axis.plot(line[:, across], line[:, up], "o-", **style)
         for joint, point in tips.items():
@@ -71,7 +74,8 @@ def draw_machine(axis, run, times, tips, view):
 
 
 def lines(model, poses, tips):
-    """Points (n, 3) of every branch, from its tip or last joint to where another has passed."""
+    """Points (n, 3) of every branch, from its tip or last joint to where another has passed, or to
+    the end of an elastic link, which `bent_lines` draws."""
     parents, seen = list(model.joint_parents), set()
     for last in reversed(range(len(parents))):
         if last in seen:
@@ -86,8 +90,20 @@ def lines(model, poses, tips):
             if joint in seen:
                 break
             seen.add(joint)
+            if model.joint_types[joint] == "elastic":
+                yield np.array(points)
+                points = []
             joint = parents[joint]
         yield np.array(points)
+
+
+def bent_lines(model, q):
+    """Points (n, 3) along the bent centre line of every elastic link."""
+    links = dict(zip(model.link_names, lw.link_poses(model, q), strict=True))
+    for link, length in model.beam_lengths.items():
+        places = np.linspace(0, length, 12).tolist()
+        sections, _ = _core.bent_sections(model, [link] * len(places), places, q)
+        yield (links[link] @ sections)[:, :3, 3]
 
 
 def closing_lines(model, q, poses):

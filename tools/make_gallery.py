@@ -27,6 +27,9 @@ SHOWN = (
     "18_press",
     "19_door",
     "20_hanging_chain",
+    "21_flexible_arm",
+    "22_flexible_jib",
+    "23_blade",
 )
 HEAD = """# Gallery
 
