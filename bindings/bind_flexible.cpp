@@ -1,4 +1,7 @@
 // Elastic links of a Model and of a ModelBuilder.
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
 #include "bind.hpp"
 #include "joint_lists.hpp"
 #include "linkwise/model/flexible_link.hpp"
@@ -40,16 +43,61 @@ FlexibleLink flexible_link(std::string link, nb::handle section, nb::handle E, n
   return out;
 }
 
-template <class... Given>
-PyModel* with_flexible(const PyModel& self, std::string link, Given... given) {
-  self.model->link_index(link);
-  return new PyModel(
-      with_flexible_link(self.model->spec(), flexible_link(std::move(link), given...)));
+/// What is given of a beam, in the order of the arguments.
+struct BeamArguments {
+  nb::handle section, E, G, density, damping, bodies, interior_modes;
+  bool stretches;
+  nb::handle end, z;
+};
+
+/// As a body of finite elements, where `body` is one, or as beams.
+template <class F>
+auto with_given(std::string link, nb::handle body, const BeamArguments& beam, F&& f) {
+  if (body.is_none()) {
+    for (const auto& [name, given] :
+         {std::pair{"section", beam.section}, {"E", beam.E}, {"G", beam.G}})
+      if (given.is_none())
+        throw InputError("flexible link '" + link + "': " + name +
+                         " is missing; give section, E and G of a beam, or body");
+    return f(flexible_link(std::move(link), beam.section, beam.E, beam.G, beam.density,
+                           beam.damping, beam.bodies, beam.interior_modes, beam.stretches, beam.end,
+                           beam.z));
+  }
+  for (const auto& [name, given] : {std::pair{"section", beam.section},
+                                    {"E", beam.E},
+                                    {"G", beam.G},
+                                    {"density", beam.density},
+                                    {"end", beam.end},
+                                    {"z", beam.z}})
+    if (!given.is_none())
+      throw InputError("flexible link '" + link + "': " + name +
+                       " is given beside body, which has its own; leave it out");
+  if (!nb::hasattr(body, "parameters"))
+    throw InputError("flexible link '" + link + "': body is " +
+                     nb::cast<std::string>(nb::str(nb::repr(body))) +
+                     "; give a linkwise.FlexibleBody");
+  return f(ModalLink{std::move(link), nb::cast<std::vector<double>>(body.attr("parameters")())});
 }
 
-template <class... Given>
-void make_flexible(ModelBuilder& self, std::string link, Given... given) {
-  self.make_flexible(flexible_link(std::move(link), given...));
+PyModel* with_flexible(const PyModel& self, std::string link, nb::handle section, nb::handle E,
+                       nb::handle G, nb::handle density, nb::handle damping, nb::handle bodies,
+                       nb::handle interior_modes, bool stretches, nb::handle end, nb::handle z,
+                       nb::handle body) {
+  self.model->link_index(link);
+  return with_given(std::move(link), body,
+                    {section, E, G, density, damping, bodies, interior_modes, stretches, end, z},
+                    [&](const auto& flexible) {
+                      return new PyModel(with_flexible_link(self.model->spec(), flexible));
+                    });
+}
+
+void make_flexible(ModelBuilder& self, std::string link, nb::handle section, nb::handle E,
+                   nb::handle G, nb::handle density, nb::handle damping, nb::handle bodies,
+                   nb::handle interior_modes, bool stretches, nb::handle end, nb::handle z,
+                   nb::handle body) {
+  with_given(std::move(link), body,
+             {section, E, G, density, damping, bodies, interior_modes, stretches, end, z},
+             [&](auto flexible) { self.make_flexible(std::move(flexible)); });
 }
 
 constexpr const char* arguments = R"(
@@ -73,22 +121,22 @@ Args:
     end: (3,) in the link's frame [m], where it ends; None: where its outboard joints are.
     z: (3,) in the link's frame, near the beam's z axis; None: the link's z, or its x for a beam
         along z. The beam's x is along it.
+    body: a linkwise.FlexibleBody, of finite elements, in place of a beam and of all of the above.
+        Its mass and inertia become the link's. Its inboard handle is at the link's frame; joints
+        that the link carries must be at its outboard one.
 
 Raises:
-    InputError: the link is unknown or flexible already, its joints are at several points, its ends
-        coincide, or a number is wrong.)";
+    InputError: the link is unknown or flexible already, its joints are at several points, or not at
+        the body's outboard handle, its ends coincide, or a number is wrong.)";
 
 }  // namespace
 
 void bind_flexible(ModelClass& model, nb::class_<ModelBuilder>& builder) {
-  using nb::handle;
-  model.def(
-      "with_flexible",
-      &with_flexible<handle, handle, handle, handle, handle, handle, handle, bool, handle, handle>,
-      "link"_a, nb::kw_only(), "section"_a, "E"_a, "G"_a, "density"_a = nb::none(),
-      "damping"_a = 0.0, "bodies"_a = 1, "interior_modes"_a = 2, "stretches"_a = true,
-      "end"_a = nb::none(), "z"_a = nb::none(), nb::rv_policy::take_ownership,
-      (std::string("The same machine with an elastic link.") + arguments).c_str());
+  model.def("with_flexible", &with_flexible, "link"_a, nb::kw_only(), "section"_a = nb::none(),
+            "E"_a = nb::none(), "G"_a = nb::none(), "density"_a = nb::none(), "damping"_a = 0.0,
+            "bodies"_a = 1, "interior_modes"_a = 2, "stretches"_a = true, "end"_a = nb::none(),
+            "z"_a = nb::none(), "body"_a = nb::none(), nb::rv_policy::take_ownership,
+            (std::string("The same machine with an elastic link.") + arguments).c_str());
   model.def_prop_ro(
       "beam_lengths",
       [](const PyModel& self) {
@@ -99,11 +147,10 @@ void bind_flexible(ModelClass& model, nb::class_<ModelBuilder>& builder) {
       },
       "Length [m] of each elastic link, by its name; links in a row count each for itself.");
   builder.def(
-      "make_flexible",
-      &make_flexible<handle, handle, handle, handle, handle, handle, handle, bool, handle, handle>,
-      "link"_a, nb::kw_only(), "section"_a, "E"_a, "G"_a, "density"_a = nb::none(),
-      "damping"_a = 0.0, "bodies"_a = 1, "interior_modes"_a = 2, "stretches"_a = true,
-      "end"_a = nb::none(), "z"_a = nb::none(),
+      "make_flexible", &make_flexible, "link"_a, nb::kw_only(), "section"_a = nb::none(),
+      "E"_a = nb::none(), "G"_a = nb::none(), "density"_a = nb::none(), "damping"_a = 0.0,
+      "bodies"_a = 1, "interior_modes"_a = 2, "stretches"_a = true, "end"_a = nb::none(),
+      "z"_a = nb::none(), "body"_a = nb::none(),
       (std::string("Makes a link elastic, once build has all of its joints.") + arguments).c_str());
 }
 

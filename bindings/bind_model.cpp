@@ -82,10 +82,12 @@ PyModel* with_link(const PyModel& self, const std::string& link, nb::handle mass
                    nb::handle inertia) {
   ModelSpec spec = self.model->spec();
   LinkSpec& old = spec.links[self.model->link_index(link)];
-  if (old.body_kind == BodyKind::beam)
+  if (old.body_kind != BodyKind::rigid)
     throw InputError("link '" + link + "'" + self.model->where() +
-                     " is an elastic beam, whose section and density say what its inertia is; "
-                     "change these where it is made flexible");
+                     (old.body_kind == BodyKind::beam
+                          ? " is an elastic beam, whose section and density say"
+                          : " is an elastic body, whose finite elements say") +
+                     " what its inertia is; change these where it is made flexible");
   LinkSpec given =
       link_spec(link, mass.is_none() ? old.mass : real_number(mass, "mass"), com, inertia);
   if (com.is_none()) given.com = old.com;

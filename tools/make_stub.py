@@ -39,13 +39,15 @@ PARAMETERS = dict.fromkeys(ARRAYS.split(), "npt.ArrayLike") | {
     "axes": "Any",  # joint axes: one per direction, or none
     "at": "str | Frame",
     "body": "str | int",
+    "make_flexible.body": "Any",  # a linkwise.FlexibleBody
+    "with_flexible.body": "Any",
     "frame": "str | Frame",
     "samples": "tuple[npt.ArrayLike, npt.ArrayLike]",
     "factors": "Mapping[str, float | Sequence[float]]",
     "fn": "Callable[..., Any]",
     "section": "Any",  # what has area, Iy, Iz and J
-    "E": "float",
-    "G": "float",
+    "E": "float | None",
+    "G": "float | None",
     "density": "float",
     "damping": "float",
     "bodies": "int",
@@ -167,7 +169,7 @@ def refine_function(function: ast.FunctionDef, owner: str) -> None:
     every = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
     for argument in every + [a for a in (arguments.vararg, arguments.kwarg) if a is not None]:
         if argument.arg != "self":
-            known = PARAMETERS.get(argument.arg)
+            known = PARAMETERS.get(f"{function.name}.{argument.arg}", PARAMETERS.get(argument.arg))
             argument.annotation = said(argument.annotation, known, f"{name}, {argument.arg}")
     returned = ast.unparse(function.returns) if function.returns else ""
     known = RETURNS.get(name, "Array" if "object" in returned else None)

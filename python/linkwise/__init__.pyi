@@ -1,6 +1,7 @@
 """The public names and where they live, for `__init__.py` and for type checkers."""
 
 from linkwise import drives as drives
+from linkwise import flexible as flexible
 from linkwise import loads as loads
 from linkwise import scenes as scenes
 from linkwise._core import ConstraintSystem as ConstraintSystem
@@ -56,6 +57,7 @@ from linkwise.drives import Table as Table
 from linkwise.drives import Torque as Torque
 from linkwise.drives import Wrench as Wrench
 from linkwise.drives import external_wrenches as external_wrenches
+from linkwise.flexible.body import FlexibleBody as FlexibleBody
 from linkwise.flexible.section import Section as Section
 from linkwise.io.load import load as load
 from linkwise.loads.undecided import undecided_loads as undecided_loads

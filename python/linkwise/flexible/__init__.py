@@ -1,1 +1,5 @@
-"""What describes flexible links."""
+"""What describes flexible links: sections of beams, and bodies of finite elements."""
+
+from linkwise.flexible.readers import FiniteElementMatrices, read_matrices
+
+__all__ = ["FiniteElementMatrices", "read_matrices"]

@@ -320,9 +320,10 @@ OUTSIDE = ("width", "height")
 
 
 class FlexibleSection(Section):
-    """A link that is an elastic beam."""
+    """A link that is an elastic beam, or a body of finite elements from a file."""
 
-    section: Literal["round", "tube", "rectangle", "box", "general"]
+    file: str | None = None
+    section: Literal["round", "tube", "rectangle", "box", "general"] | None = None
     diameter: Length | None = None
     wall: Length | None = None
     width: Length | None = None
@@ -331,8 +332,8 @@ class FlexibleSection(Section):
     Iy: SecondMoment | None = None
     Iz: SecondMoment | None = None
     J: SecondMoment | None = None
-    E: Modulus
-    G: Modulus
+    E: Modulus | None = None
+    G: Modulus | None = None
     density: Annotated[float, of("density"), Field(gt=0)] | None = None
     damping: Annotated[Number, Field(ge=0)] = 0.0
     bodies: Annotated[int, Field(ge=1)] = 1

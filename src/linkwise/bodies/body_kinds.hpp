@@ -2,7 +2,8 @@
 // The kinds of bodies: what each answers, the table, and the dispatch. A new kind is a file like
 // rigid.hpp and one line of the table. The kind of a body is known while compiling wherever it is
 // asked: loops over ranges of equal bodies dispatch once per range (kinematics/kind_ranges.hpp),
-// and lanes hold rigid bodies alone. Which methods take which kinds is in the table of methods.
+// and lanes hold rigid bodies alone. All kinds with coordinates are one to them
+// (coordinate_body.hpp). Which methods take which kinds is in the table of methods.
 #include <concepts>
 #include <cstdint>
 #include <span>
@@ -12,6 +13,8 @@
 #include <vector>
 
 #include "linkwise/bodies/beam.hpp"
+#include "linkwise/bodies/coordinate_body.hpp"
+#include "linkwise/bodies/modal.hpp"
 #include "linkwise/bodies/own_coordinates.hpp"
 #include "linkwise/bodies/rigid.hpp"
 
@@ -43,7 +46,7 @@ concept BodyPorts = requires(const B& body, const RigidBody<double>& link, const
 };
 
 /// By number, the place of its line in the table.
-enum class BodyKind : std::uint8_t { rigid, beam };
+enum class BodyKind : std::uint8_t { rigid, beam, modal };
 
 template <class B>
 struct BodyTag {
@@ -75,13 +78,27 @@ struct BodyKindTable {
     else
       return static_cast<int>(kind) == i ? f(BodyTag<B>{}) : dispatch<i + 1>(kind, f);
   }
+  /// The same with CoordinateBody for every kind that has coordinates.
+  template <int i = 0, class F>
+  static LW_INLINE decltype(auto) dispatch_seen(BodyKind kind, F&& f) {
+    if constexpr (i == size) {
+      return f(BodyTag<CoordinateBody>{});
+    } else {
+      using B = std::tuple_element_t<i, std::tuple<Kinds...>>;
+      if constexpr (has_coordinates<B>)
+        return dispatch_seen<i + 1>(kind, f);
+      else
+        return static_cast<int>(kind) == i ? f(BodyTag<B>{}) : dispatch_seen<i + 1>(kind, f);
+    }
+  }
 };
 
 /// Rigid first. The order is that of stored models.
 using BodyKinds = BodyKindTable<  //
-    RigidBody<double>, Beam>;
+    RigidBody<double>, Beam, ModalBody>;
 static_assert(BodyKinds::kind_of<RigidBody<double>>() == BodyKind::rigid);
 static_assert(BodyKinds::kind_of<Beam>() == BodyKind::beam);
+static_assert(BodyKinds::kind_of<ModalBody>() == BodyKind::modal);
 
 inline const char* body_kind_name(BodyKind kind) {
   return BodyKinds::names[static_cast<int>(kind)];

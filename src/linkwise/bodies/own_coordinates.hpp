@@ -39,12 +39,12 @@ struct OwnEquations {
 /// The same with room for what it points to.
 template <class S>
 struct OwnEquationsHere : OwnEquations<S> {
-  OwnEquationsHere() : OwnEquations<S>{{}, {}, columns, square, bias} {}
+  OwnEquationsHere() : OwnEquations<S>{{}, {}, columns.at, square, bias} {}
   OwnEquationsHere(const OwnEquationsHere&) = delete;
   OwnEquationsHere& operator=(const OwnEquationsHere&) = delete;
 
  private:
-  Force<S> columns[most_coordinates];
+  PerCoordinate<Force<S>> columns;
   S square[most_coordinates * (most_coordinates + 1) / 2];
   S bias[most_coordinates];
 };

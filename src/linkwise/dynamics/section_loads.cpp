@@ -9,12 +9,8 @@ namespace linkwise {
 namespace {
 
 const Beam* beam_of(const Model& model, int body) {
-  return with_body(model, body, [](const auto& it) -> const Beam* {
-    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(it)>, Beam>)
-      return &it;
-    else
-      return nullptr;
-  });
+  return model.topology[body].body_kind == BodyKind::beam ? &BodiesOfKind<Beam>{model}[body]
+                                                          : nullptr;
 }
 
 /// What a unit of each rate of the coordinates turns a section by.

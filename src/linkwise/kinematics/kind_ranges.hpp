@@ -44,7 +44,7 @@ LW_INLINE void dispatch_bodies(const Model& model, const KindRange& range, F&& f
       f(joint, BodiesOfKind<RigidBody<double>>{model}, begin, end);
     });
   } else {
-    BodyKinds::dispatch<1>(range.body_kind, [&](auto kind) {
+    BodyKinds::dispatch_seen<1>(range.body_kind, [&](auto kind) {
       f(GeneralJoint{}, BodiesOfKind<typename decltype(kind)::Body>{model}, range.begin, range.end);
     });
   }

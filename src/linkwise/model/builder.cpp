@@ -164,8 +164,9 @@ void ModelBuilder::set_floating_base(std::string joint_name) {
 ModelSpec ModelBuilder::spec(bool keep_fixed) const {
   ModelSpec spec = spec_;
   spec.keep_fixed = keep_fixed;
-  for (const FlexibleLink& flexible : flexible_)
-    spec = with_flexible_link(std::move(spec), flexible);
+  for (const auto& any : flexible_)
+    std::visit([&](const auto& flexible) { spec = with_flexible_link(std::move(spec), flexible); },
+               any);
   return spec;
 }
 

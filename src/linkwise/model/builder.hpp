@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "linkwise/model/flexible_link.hpp"
@@ -47,7 +48,8 @@ class ModelBuilder {
   void add_coupling(CouplingSpec coupling) { spec_.couplings.push_back(std::move(coupling)); }
 
   /// Once all joints are there: spec() does it. Throws then as with_flexible_link.
-  void make_flexible(FlexibleLink flexible) { flexible_.push_back(std::move(flexible)); }
+  void make_flexible(FlexibleLink flexible) { flexible_.emplace_back(std::move(flexible)); }
+  void make_flexible(ModalLink flexible) { flexible_.emplace_back(std::move(flexible)); }
 
   /// level: "merge", "warning" or "info".
   void add_note(const std::string& level, std::string element, std::string text);
@@ -61,7 +63,7 @@ class ModelBuilder {
                 Properties properties) const;
 
   ModelSpec spec_;
-  std::vector<FlexibleLink> flexible_;
+  std::vector<std::variant<FlexibleLink, ModalLink>> flexible_;
 };
 
 /// Links that are all the same, in a row.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <numbers>
 
@@ -14,12 +15,12 @@ namespace {
 
 double length_of(const Vec3<double>& a) { return std::sqrt(dot(a, a)); }
 
-/// Of the joints that the link carries, all at one point.
-Vec3<double> end_of(const ModelSpec& spec, const FlexibleLink& flexible, const std::string& head) {
+/// The joints that the link carries are all at this point, if there are any.
+std::optional<Vec3<double>> carried_at(const ModelSpec& spec, const std::string& link,
+                                       const std::string& head) {
   const JointSpec* first = nullptr;
-  if (flexible.end) return *flexible.end;
   for (const JointSpec& joint : spec.joints) {
-    if (joint.parent != flexible.link) continue;
+    if (joint.parent != link) continue;
     if (!first) first = &joint;
     if (length_of(joint.translation - first->translation) >
         1e-9 * (1 + length_of(joint.translation)))
@@ -27,16 +28,22 @@ Vec3<double> end_of(const ModelSpec& spec, const FlexibleLink& flexible, const s
                        "' are at different points of it; let all joints be at its end, and rigid "
                        "links carry what is elsewhere");
   }
+  if (first) return first->translation;
   for (const LoopJointSpec& loop : spec.loop_joints) {
-    const bool parent = loop.joint.parent == flexible.link;
-    if (first || (!parent && loop.joint.child != flexible.link)) continue;
-    return parent ? loop.joint.translation : loop.child_translation;
+    if (loop.joint.parent == link) return loop.joint.translation;
+    if (loop.joint.child == link) return loop.child_translation;
   }
-  if (!first)
+  return {};
+}
+
+Vec3<double> end_of(const ModelSpec& spec, const FlexibleLink& flexible, const std::string& head) {
+  if (flexible.end) return *flexible.end;
+  const std::optional<Vec3<double>> end = carried_at(spec, flexible.link, head);
+  if (!end)
     throw InputError(head +
                      "carries no joint that would say where it ends; give end, a point in "
                      "the link's frame");
-  return first->translation;
+  return *end;
 }
 
 /// Columns: x along the beam, z as near as can be to the one that is wanted.
@@ -128,11 +135,11 @@ std::string frequencies(const BeamProperties& of, double length) {
   return text;
 }
 
-}  // namespace
+std::string head_of(const ModelSpec& spec, const std::string& name) {
+  return "flexible link '" + name + "'" + source_of(spec) + ": ";
+}
 
-ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
-  const std::string& name = flexible.link;
-  const std::string head = "flexible link '" + name + "'" + source_of(spec) + ": ";
+LinkSpec& rigid_link(ModelSpec& spec, const std::string& name, const std::string& head) {
   const auto found = std::find_if(spec.links.begin(), spec.links.end(),
                                   [&](const LinkSpec& link) { return link.name == name; });
   if (found == spec.links.end()) {
@@ -142,6 +149,47 @@ ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
   }
   if (found->body_kind != BodyKind::rigid)
     throw InputError(head + "is flexible already; make it so once");
+  return *found;
+}
+
+/// Of a modal body, clamped where it starts and free elsewhere.
+std::string frequencies(const ModalShape& of) {
+  std::string text = "is an elastic body of " + std::to_string(of.n) +
+                     " modes; clamped at its start it vibrates at ";
+  const int shown = std::min(of.n, 3);
+  for (int k = 0; k < shown; ++k)
+    text += (k == 0          ? ""
+             : k + 1 < shown ? ", "
+                             : " and ") +
+            hertz(std::sqrt(of.stiffness[k] / of.m_e[packed(k, k)]));
+  return text + " Hz" + (shown < of.n ? ", up to " : "") +
+         (shown < of.n
+              ? hertz(std::sqrt(of.stiffness[of.n - 1] / of.m_e[packed(of.n - 1, of.n - 1)])) +
+                    " Hz"
+              : "");
+}
+
+Sym3<double> about_centre(const Inertia<double>& M, const Vec3<double>& c) {
+  Sym3<double> I = M.I;
+  I.m[0] -= M.m * (c.y * c.y + c.z * c.z);
+  I.m[1] += M.m * c.x * c.y;
+  I.m[2] -= M.m * (c.x * c.x + c.z * c.z);
+  I.m[3] += M.m * c.x * c.z;
+  I.m[4] += M.m * c.y * c.z;
+  I.m[5] -= M.m * (c.x * c.x + c.y * c.y);
+  return I;
+}
+
+std::string point_text(const Vec3<double>& r) {
+  return "(" + number_text(r.x) + ", " + number_text(r.y) + ", " + number_text(r.z) + ")";
+}
+
+}  // namespace
+
+ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
+  const std::string& name = flexible.link;
+  const std::string head = head_of(spec, name);
+  LinkSpec& link = rigid_link(spec, name, head);
   check_numbers(flexible, head);
   const Vec3<double> end = end_of(spec, flexible, head);
   if (!(length_of(end) > 0) || !std::isfinite(length_of(end)))
@@ -150,11 +198,11 @@ ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
                      "inboard joint");
   const Mat3<double> axes = beam_axes(flexible, end, head);
   const double length = length_of(end);
-  if (!flexible.density && !(found->mass > 0))
+  if (!flexible.density && !(link.mass > 0))
     throw InputError(head + "has no mass; give density in kg/m3, or the link a mass");
   BeamProperties of{};
   of.length = length / flexible.bodies;
-  of.mass_per_length = flexible.density ? *flexible.density * flexible.area : found->mass / length;
+  of.mass_per_length = flexible.density ? *flexible.density * flexible.area : link.mass / length;
   of.EA = flexible.E * flexible.area;
   of.EIy = flexible.E * flexible.Iy;
   of.EIz = flexible.E * flexible.Iz;
@@ -169,7 +217,7 @@ ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
   of.height = flexible.height;
   of.round = flexible.round;
   std::copy(axes.m, axes.m + 9, of.axes);
-  set_straight(*found, of, axes);
+  set_straight(link, of, axes);  // before others are added
   const std::string tip = name + ":end";
   move_to_end(spec, name, tip, axes, end);
 
@@ -192,6 +240,48 @@ ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
     joint.translation = {of.length, 0, 0};
   }
   spec.notes.push_back({NoteLevel::info, name, frequencies(of, length)});
+  return spec;
+}
+
+ModelSpec with_flexible_link(ModelSpec spec, const ModalLink& flexible) {
+  const std::string& name = flexible.link;
+  const std::string head = head_of(spec, name);
+  LinkSpec& link = rigid_link(spec, name, head);
+  if (const std::string fault = ModalBody::fault(flexible.parameters); !fault.empty())
+    throw InputError(head + fault);
+  const std::optional<Vec3<double>> at = carried_at(spec, name, head);
+  std::vector<double> parameters = flexible.parameters;
+  double& has_port = parameters[offsetof(ModalProperties, has_port) / sizeof(double)];
+  if (at && has_port == 0)
+    throw InputError(head +
+                     "carries joints, and its body has no outboard handle; give the body "
+                     "one, or the joints another link");
+  has_port = 1;  // where it has none, one that does not move: users see coordinates of joints
+  const ModalBody body = ModalBody::make({}, parameters);
+  const Inertia<double>& M = body.straight.inertia;
+  link.mass = M.m;
+  link.com = (1 / M.m) * M.mc;
+  link.inertia = about_centre(M, link.com);
+  link.body_kind = BodyKind::modal;
+  link.parameters = std::move(parameters);
+  spec.notes.push_back({NoteLevel::info, name, frequencies(*body.shape)});
+  const Mat3<double> axes = transpose(body.to_axes.R);
+  const Vec3<double> end = axes * body.port()->rest;
+  if (at && length_of(*at - end) > 1e-6 * (1e-3 + length_of(end)))
+    throw InputError(head + "carries joints at " + point_text(*at) +
+                     ", and its outboard handle is at " + point_text(end) +
+                     " in the link's frame; let the joints be there");
+  const std::string tip = name + ":end";
+  move_to_end(spec, name, tip, axes, at ? *at : end);
+  JointSpec joint;
+  joint.type = JointType::elastic;
+  joint.name = name + ":1";
+  joint.parent = name;
+  joint.child = tip;
+  joint.rotation = axes;
+  joint.translation = end;
+  spec.joints.push_back(joint);
+  spec.links.push_back({tip, 0, {}, {}});
   return spec;
 }
 

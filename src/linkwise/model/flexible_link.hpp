@@ -1,8 +1,9 @@
 #pragma once
-// Makes an elastic beam of a rigid link of a spec: a row of beams, each welded to the end of the
-// one before, from the link's frame to the point where its outboard joints are.
+// Makes an elastic body of a rigid link of a spec: a row of beams, each welded to the end of the
+// one before, from the link's frame to the point where its outboard joints are, or one modal body.
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "linkwise/model/spec.hpp"
 
@@ -27,5 +28,15 @@ struct FlexibleLink {
 /// Elastic joints `NAME:1` ... join them. Throws InputError where the link is not there, is
 /// flexible already, its joints are at several points, or a number is wrong.
 ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible);
+
+/// A link that is a modal body (bodies/modal.hpp).
+struct ModalLink {
+  std::string link;
+  std::vector<double> parameters;
+};
+
+/// `NAME:end` and the elastic joint `NAME:1` as above. A body without a port carries no joints.
+/// Throws InputError likewise, and where the link's joints are not at the body's port.
+ModelSpec with_flexible_link(ModelSpec spec, const ModalLink& flexible);
 
 }  // namespace linkwise

@@ -44,9 +44,14 @@ std::vector<std::string> words(const char* text) {
   return out;
 }
 
-/// Of a beam (bodies/beam.hpp): how far it stretches, where it does; twist; deflections.
-std::vector<ScalarLabel> elastic_labels(int n) {
+/// Of a beam (bodies/beam.hpp): how far it stretches, where it does; twist; deflections. Of a modal
+/// body (bodies/modal.hpp): its modes.
+std::vector<ScalarLabel> elastic_labels(BodyKind kind, int n) {
   std::vector<ScalarLabel> out;
+  if (kind == BodyKind::modal) {
+    for (int k = 1; k <= n; ++k) out.push_back({"mode" + std::to_string(k), "m"});
+    return out;
+  }
   const bool stretches = n % 2 == 0;
   const int in_plane = (n - 1 - stretches) / 2;
   if (stretches) out.push_back({"stretch", "m"});
@@ -58,7 +63,8 @@ std::vector<ScalarLabel> elastic_labels(int n) {
 
 std::vector<ScalarLabel> labels(const JointSpec& joint, const char* suffixes,
                                 const char* ElementKindInfo::*units) {
-  if (joint.type == JointType::elastic) return elastic_labels(joint.n_coordinates);
+  if (joint.type == JointType::elastic)
+    return elastic_labels(joint.parent_kind, joint.n_coordinates);
   std::vector<ScalarLabel> out;
   for (int k = 0; k < n_joint_elements(joint); ++k)
     for (const std::string& unit : words(info_of(joint_element(joint, k).kind).*units))

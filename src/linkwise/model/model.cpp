@@ -173,6 +173,17 @@ std::vector<int> Model::joint_parents() const {
   return parents;
 }
 
+CoordinateBody coordinate_body(const Model& model, int n) {
+  const BodyTopology& at = model.topology[n];
+  return BodyKinds::dispatch(at.body_kind, [&](auto kind) {
+    using B = typename decltype(kind)::Body;
+    if constexpr (has_coordinates<B>)
+      return CoordinateBody(at.body_kind, &BodiesOfKind<B>{model}[n]);
+    else
+      return CoordinateBody();
+  });
+}
+
 void refuse_loops(const Model& model, const std::string& who, const std::string& remedy) {
   if (!model.is_constrained()) return;
   const bool loop = model.n_loops() > 0;

@@ -236,6 +236,9 @@ class Model {
 /// is to remove them.
 void refuse_loops(const Model& model, const std::string& who, const std::string& remedy = "");
 
+/// Body n, of a kind with coordinates.
+CoordinateBody coordinate_body(const Model& model, int n);
+
 /// The bodies of a range, whose kind is known while compiling.
 template <class B>
 struct BodiesOfKind {
@@ -245,10 +248,16 @@ struct BodiesOfKind {
   }
 };
 
+template <>
+struct BodiesOfKind<CoordinateBody> {
+  const Model& model;
+  CoordinateBody operator[](int n) const { return coordinate_body(model, n); }
+};
+
 /// f(body n). Loops that count dispatch once per range instead (kinematics/kind_ranges.hpp).
 template <class F>
 LW_INLINE decltype(auto) with_body(const Model& model, int n, F&& f) {
-  return BodyKinds::dispatch(model.topology[n].body_kind, [&](auto kind) -> decltype(auto) {
+  return BodyKinds::dispatch_seen(model.topology[n].body_kind, [&](auto kind) -> decltype(auto) {
     return f(BodiesOfKind<typename decltype(kind)::Body>{model}[n]);
   });
 }

@@ -102,7 +102,9 @@ struct JointSpec {
   std::string name;
   JointType type = JointType::revolute;
   std::string parent, child;
-  int n_coordinates = 0;  ///< of an elastic joint, those of its parent; validate() finds them
+  /// Of an elastic joint, those of its parent, and its kind; validate() finds them.
+  int n_coordinates = 0;
+  BodyKind parent_kind = BodyKind::rigid;
   Mat3<double> rotation =
       Mat3<double>::identity();  ///< joint axes in the parent link frame (columns)
   Vec3<double> translation;      ///< joint point in the parent link frame, m

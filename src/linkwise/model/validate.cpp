@@ -113,11 +113,16 @@ int count_coordinates(const LinkSpec& link) {
   });
 }
 
+struct Coordinates {
+  BodyKind kind;
+  int n;  ///< 0 once the link has its elastic joint
+};
+
 /// Elastic joints and elastic links belong to each other, one to one.
 void validate_ports(ModelSpec& spec, const std::string& where) {
-  std::unordered_map<std::string, int> coordinates;  // of elastic links, 0 once one has its joint
+  std::unordered_map<std::string, Coordinates> coordinates;  // of elastic links
   for (const LinkSpec& link : spec.links)
-    if (const int n = count_coordinates(link)) coordinates[link.name] = n;
+    if (const int n = count_coordinates(link)) coordinates[link.name] = {link.body_kind, n};
   for (JointSpec& joint : spec.joints) {
     const auto parent = coordinates.find(joint.parent);
     const bool on_elastic = parent != coordinates.end();
@@ -131,14 +136,15 @@ void validate_ports(ModelSpec& spec, const std::string& where) {
     if (!on_elastic)
       throw InputError(head + "is elastic, but link '" + joint.parent +
                        "' is rigid; make that link flexible, or the joint fixed");
-    if (parent->second == 0)
+    if (parent->second.n == 0)
       throw InputError(head + "link '" + joint.parent + "' has an elastic joint already; keep one");
     if (!joint.dof.empty())
       throw InputError(head + "is elastic and has no properties of its own; give the link's");
-    joint.n_coordinates = std::exchange(parent->second, 0);
+    joint.n_coordinates = std::exchange(parent->second.n, 0);
+    joint.parent_kind = parent->second.kind;
   }
   for (const LinkSpec& link : spec.links)
-    if (const auto at = coordinates.find(link.name); at != coordinates.end() && at->second > 0)
+    if (const auto at = coordinates.find(link.name); at != coordinates.end() && at->second.n > 0)
       throw InputError("link '" + link.name + "'" + where +
                        ": is elastic, and no elastic joint is on it; add one, to the link at its "
                        "end");
@@ -262,7 +268,7 @@ void validate_link(const LinkSpec& link, const std::string& where, std::vector<N
     if (!std::isfinite(x))
       throw InputError(head + "inertia is not finite; give finite numbers in kg m2");
   const int kind = static_cast<int>(link.body_kind), n = BodyKinds::n_parameters[kind];
-  if (static_cast<int>(link.parameters.size()) != n)
+  if (n >= 0 && static_cast<int>(link.parameters.size()) != n)
     throw InputError(head + "body kind " + BodyKinds::names[kind] + " takes " + std::to_string(n) +
                      " parameters, not " + std::to_string(link.parameters.size()));
   for (double x : link.parameters)

@@ -29,7 +29,7 @@ template <class S>
 LW_INLINE bool eliminate_own(int n, OwnEquations<S>& of, const S* tau, S* h,
                              ArticulatedInertia<S>& Y, Force<S>& p) {
   const bool positive = cholesky_factor(n, of.m_e, smallest_pivot);
-  Force<S> W[most_coordinates];
+  PerCoordinate<Force<S>> W;
   S z[most_coordinates];
   for (int i = 0; i < n; ++i) {
     Force<S> column = of.M_e[i];

@@ -14,7 +14,18 @@
 namespace linkwise {
 
 /// Coordinates that a body can have of its own, at most.
-inline constexpr int most_coordinates = 14;
+inline constexpr int most_coordinates = 40;
+
+/// Room for one of them each. It is not set: most bodies have few.
+template <class T>
+struct PerCoordinate {
+  union {
+    T at[most_coordinates];
+  };
+  PerCoordinate() {}
+  LW_INLINE operator T*() { return at; }
+  LW_INLINE operator const T*() const { return at; }
+};
 
 /// What places the frame; constants of the body.
 struct ElasticShape {
@@ -65,7 +76,7 @@ struct TurnSeries {
 template <class S>
 struct ElasticPort {
   Transform<S> X;
-  Motion<S> P[most_coordinates];
+  PerCoordinate<Motion<S>> P;
 };
 
 namespace elastic_port {
