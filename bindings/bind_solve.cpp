@@ -9,6 +9,7 @@
 
 #include "bind.hpp"
 #include "linkwise/dynamics/constraint_system.hpp"
+#include "linkwise/dynamics/graph_spectrum.hpp"
 #include "linkwise/dynamics/method_over_time.hpp"
 #include "linkwise/linear/triplets.hpp"
 #include "linkwise/solve/registry.hpp"
@@ -315,6 +316,36 @@ many as needed.)")
           "Spectral radius of Jacobi's iteration matrix 1 - D^-1 A; it converges below 1.");
 }
 
+void bind_graph_spectrum(nb::module_& m) {
+  nb::class_<GraphSpectrum>(
+      m, "GraphSpectrum",
+      "What conjugate gradients meet on a machine with closed loops or flexible links.")
+      .def_ro("unknowns", &GraphSpectrum::unknowns, "Joint constraint forces.")
+      .def_ro("found", &GraphSpectrum::found,
+              "Spectrum of P^-1 A, P the block diagonal with rigid knots whole.")
+      .def_prop_ro(
+          "bound",
+          [](const GraphSpectrum& s) { return std::tuple(s.bound.smallest, s.bound.largest); },
+          "Between which numbers it lies, by the bodies one by one [wathen1987]; smallest 0: there "
+          "is no bound.")
+      .def(
+          "iterations",
+          [](const GraphSpectrum& s, double tolerance) { return s.bound.iterations(tolerance); },
+          "tolerance"_a,
+          "Iterations, at most, that take the error's energy norm down to that part.");
+  m.def(
+      "graph_spectrum",
+      [](const PyModel& model, nb::handle q) {
+        const States s = states_of(*model.model, q, nb::none(), nb::none(), nb::none(), 0);
+        return graph_spectrum(*model.model, s.q.data);
+      },
+      "model"_a, "q"_a,
+      R"(The spectrum of A f = b that conjugate gradients meet at position q (nq,) [rad, m].
+
+Raises:
+    InputError: q does not fit, or the model has what method constraint_force does not take.)");
+}
+
 void make_method(PyDynamicsMethod* self, const PyModel& model, const std::string& method,
                  const std::string& solver, const std::string& guess, double tolerance,
                  const std::string& stop, int max_iterations, nb::handle given_options,
@@ -405,6 +436,7 @@ Raises:
 void bind_solve(nb::module_& m) {
   bind_spectrum(m);
   bind_system(m);
+  bind_graph_spectrum(m);
   bind_dynamics_method(m);
   m.def("initial_guesses", &initial_guess_list,
         R"(The table of initial guesses: dictionaries of name, description, reference.)");

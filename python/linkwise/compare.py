@@ -231,7 +231,7 @@ def compare(
         "mean_step": float(np.diff(trajectory.times).mean()),
         "tolerance": tolerance,
         "stop": stop,
-        **_system(model, trajectory),
+        **_system(model, trajectory, tolerance),
         "rows": sorted(rows, key=_rank),
     }
 
@@ -334,25 +334,33 @@ def _error(
     return float(np.sqrt(error.max() / size.max())) if size.max() > 0 else float(error.max())
 
 
-def _system(model: Model, trajectory: Trajectory) -> dict[str, Any]:
+def _system(model: Model, trajectory: Trajectory, tolerance: float) -> dict[str, Any]:
     """The system A f = b: its size, and the worst of its conditioning at some states."""
     places = np.linspace(0, trajectory.times.size - 1, _SPECTRUM_STATES).astype(int)
-    try:
-        systems = [_core.ConstraintSystem(model, trajectory.q[k]) for k in places]
-    except InputError as error:
-        return {
-            "unknowns": None,
-            "condition_estimate": None,
-            "spectral_radius": None,
-            "system_message": str(error),
-        }
-    spectra = [system.spectrum() for system in systems]
-    return {
-        "unknowns": systems[0].size,
-        "condition_estimate": max(s.condition for s in spectra),
-        "spectral_radius": max(s.radius for s in spectra),
+    found: dict[str, Any] = {
+        "unknowns": None,
+        "condition_estimate": None,
+        "spectral_radius": None,
         "system_message": "",
+        "spectrum_bound": None,
+        "iterations_bound": None,
     }
+    try:
+        if model.n_loops or model.coupling_names or model.beam_lengths:
+            graphs = [_core.graph_spectrum(model, trajectory.q[k]) for k in places]
+            spectra, found["unknowns"] = [graph.found for graph in graphs], graphs[0].unknowns
+            least, most = (min(g.bound[0] for g in graphs), max(g.bound[1] for g in graphs))
+            if least > 0:
+                found["spectrum_bound"] = [least, most]
+                found["iterations_bound"] = max(graph.iterations(tolerance) for graph in graphs)
+        else:
+            systems = [_core.ConstraintSystem(model, trajectory.q[k]) for k in places]
+            spectra, found["unknowns"] = [s.spectrum() for s in systems], systems[0].size
+    except InputError as error:
+        return {**found, "system_message": str(error)}
+    found["condition_estimate"] = max(s.condition for s in spectra)
+    found["spectral_radius"] = max(s.radius for s in spectra)
+    return found
 
 
 def plot(comparison: Mapping[str, Any]) -> str:

@@ -81,6 +81,12 @@ def _show(found: dict[str, Any]) -> None:
         if unknowns is not None
         else f"No condition of A f = b: {found['system_message']}."
     )
+    if found["spectrum_bound"] is not None:
+        least, most = (number(x, 3) for x in found["spectrum_bound"])
+        system += (
+            f" Its bodies bound the spectrum that conjugate gradients meet to [{least}, {most}]: "
+            f"at most {found['iterations_bound']:.0f} iterations for any number of them."
+        )
     screen.print(
         f"{text(found['model'])}, {found['bodies']} bodies, {found['degrees_of_freedom']} degrees "
         f"of freedom, {found['motion']}: {found['states']} steps of "

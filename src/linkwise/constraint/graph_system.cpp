@@ -4,79 +4,12 @@
 #include <cmath>
 
 #include "linkwise/base/error.hpp"
+#include "linkwise/constraint/constraint_graph.hpp"
 #include "linkwise/forces/armature_bias.hpp"
 #include "linkwise/kinematics/coupling_states.hpp"
 #include "linkwise/kinematics/user_frames.hpp"
 
 namespace linkwise {
-namespace {
-
-/// Column of P of the joint that a term couples, or -1 where its motion is given.
-int column_of(const Model& model, const Coupling::Term& term) {
-  if (term.closes) {
-    const JointInfo& joint = model.joint_at(term.joint);
-    return model.loops.elements[joint.first_element].prescribed ? -1 : 0;
-  }
-  const BodyTopology& body = model.topology[term.body];
-  int column = 0;
-  for (int i = 0; i < body.n_elements; ++i) {
-    const Element& e = model.elements[body.first_element + i];
-    if (e.prescribed) continue;
-    if (e.v == term.v) return column;
-    column += e.nv;
-  }
-  return -1;
-}
-
-const LoopJoint& loop_of(const Model& model, const Coupling::Term& term) {
-  return model.loops.joints[term.joint - model.n_joints()];
-}
-
-}  // namespace
-
-BlockGraph make_constraint_graph(const Model& model) {
-  std::vector<int> dims;
-  std::vector<std::vector<int>> hubs;
-  const auto node = [&](int rows) {
-    dims.push_back(rows);
-    hubs.push_back({});
-  };
-  const auto end_on = [&](int body) {
-    if (body >= 0 && std::find(hubs.back().begin(), hubs.back().end(), body) == hubs.back().end())
-      hubs.back().push_back(body);
-  };
-  for (int n = 0; n < model.n_bodies(); ++n) {
-    node(constraint_rows(model, n));
-    end_on(n);
-    end_on(model.topology[n].parent);
-  }
-  for (const LoopJoint& loop : model.loops.joints) {
-    node(loop_rows(model, loop));
-    end_on(loop.joint.body);
-    end_on(loop.parent_body);
-  }
-  for (const Coupling& coupling : model.couplings) {
-    node(1);
-    for (const Coupling::Term& term : coupling.terms) {
-      if (column_of(model, term) < 0) continue;
-      end_on(term.body);
-      end_on(term.closes ? loop_of(model, term).parent_body : model.topology[term.body].parent);
-    }
-  }
-  BlockGraph graph;
-  graph.set_structure(dims, hubs);
-  return graph;
-}
-
-std::string refusal_of_graph(const Model& model) {
-  if (const int body = model.singular_body(); body >= 0) return singular_inertia(model, body);
-  for (const LoopJoint& loop : model.loops.joints)
-    if (loop.parent_body == loop.joint.body)
-      return "joint '" + loop.joint.name + "'" + model.where() +
-             " joins links that move as one, which method constraint_force does not take; remove "
-             "it, or use method articulated_body";
-  return "";
-}
 
 GraphSystem::GraphSystem(const Model& model)
     : model_(&model),
@@ -84,14 +17,15 @@ GraphSystem::GraphSystem(const Model& model)
       general_(model.n_general),
       joint_(model.n_bodies()),
       loops_(model),
+      boxes_(model),
       g_(model.n_bodies()),
       known_(model.n_bodies()),
       known_of_loop_(model.n_loops()),
       w_(model.n_bodies()),
-      loop_w_(model.n_loops()),
-      a_(model.n_bodies()) {
+      loop_w_(model.n_loops()) {
   if (const std::string why = refusal_of_graph(model); !why.empty()) throw InputError(why);
   A_ = make_constraint_graph(model);
+  a_.resize(A_.motion_begin.back());
   for (const Coupling& coupling : model.couplings) {
     columns_.push_back({});
     for (const Coupling::Term& term : coupling.terms)
@@ -100,8 +34,11 @@ GraphSystem::GraphSystem(const Model& model)
   }
   for (auto* x : {&b_, &r_, &size_}) x->resize(A_.size());
   for (int n = 0; n < model.n_bodies(); ++n) {
-    compliance_.push_back(compliance(model.constants[n].rigid));
-    A_.compliance[n] = to_matrix(compliance_[n]);
+    is_massless_.push_back(is_massless_on_port(model, n));
+    if (!is_massless_[n] && !boxes_.has(n)) {
+      const Matrix6<double> C = to_matrix(compliance(model.constants[n].rigid));
+      std::copy(C.begin(), C.end(), A_.compliance(n));
+    }
     const BodyTopology& body = model.topology[n];
     if (body.joint_kind == JointKind::general) continue;
     const Motion<double> P = element_column<double>(model.elements[body.first_element], 0);
@@ -119,17 +56,29 @@ int GraphSystem::body_of_node(int node) const {
   return model.couplings[node - node_of_coupling(0)].terms[0].body;
 }
 
-void GraphSystem::put(int node, int r, int body, const Force<double>& wrench) {
-  if (body < 0) {
+GraphSystem::Site GraphSystem::site_of(int body) const {
+  if (body < 0 || !is_massless_[body]) return {body, 0};
+  return {model_->topology[body].parent, 6};
+}
+
+GraphSystem::Site GraphSystem::site_inboard(int n) const {
+  const BodyTopology& body = model_->topology[n];
+  if (body.parent >= 0 && boxes_.has(body.parent) && on_port(*model_, body))
+    return {body.parent, 6};
+  return site_of(body.parent);
+}
+
+void GraphSystem::put(int node, int r, const Site& at, const Force<double>& wrench) {
+  if (at.hub < 0) {
     const double known = dot(ground_, wrench);
     r_[A_.offset[node] + r] -= known;
     size_[A_.offset[node] + r] += std::abs(known);
     return;
   }
   int which = 0;
-  while (A_.end_hub[A_.node_ends[A_.node_begin[node] + which]] != body) ++which;
+  while (A_.end_hub[A_.node_ends[A_.node_begin[node] + which]] != at.hub) ++which;
   const Vector6<double> w = to_array(wrench);
-  double* const row = A_.lever(node, which, r);
+  double* const row = A_.lever(node, which, r) + at.first;
   for (int i = 0; i < 6; ++i) row[i] += w[i];
 }
 
@@ -151,6 +100,12 @@ void GraphSystem::assemble(const SweepInput<double>& in, const double* asked) {
   std::fill(A_.levers.begin(), A_.levers.end(), 0.0);
   std::fill(r_.begin(), r_.end(), 0.0);
   std::fill(size_.begin(), size_.end(), 0.0);
+  is_regular_ = true;
+  for (int n = 0; n < model.n_bodies(); ++n)
+    if (boxes_.has(n)) {
+      is_regular_ &= boxes_.update(in, n, state_, A_.compliance(n));
+      boxes_.set_forces(in, n);
+    }
   for (int n = 0; n < model.n_bodies(); ++n) assemble_joint(n, in.tau);
   for (int l = 0; l < model.n_loops(); ++l) assemble_loop(l, asked);
   for (int c = 0; c < model.n_couplings(); ++c) assemble_coupling(c, in, asked);
@@ -163,13 +118,16 @@ void GraphSystem::assemble(const SweepInput<double>& in, const double* asked) {
 }
 
 void GraphSystem::assemble_joint(int n, const double* tau) {
+  if (is_massless_[n]) return;
   const JointConstraint<double>& joint = joint_[n];
-  const int parent = model_->topology[n].parent;
+  const Site inboard = site_inboard(n);
+  const bool is_welded = inboard.first > 0 && on_port(*model_, model_->topology[n]);
   for (int r = 0; r < joint.rows; ++r) {
     const Force<double> B = to_force(joint.B[r].data());
-    const Force<double> reaction = transpose_times(state_[n].X, B);
+    const Force<double> reaction = is_welded ? B : transpose_times(state_[n].X, B);
     put(n, r, n, B);
-    put(n, r, parent, {-reaction.lin, -reaction.ang});
+    put(n, r, inboard, {-reaction.lin, -reaction.ang});
+    if (is_welded) continue;  // c is in the port's motion
     A_.own[A_.offset[n] + r] = joint.compliance[r];
     ask(n, r, dot(state_[n].c, B));
     if (joint.armature_of[r] >= 0) ask(n, r, tau[joint.armature_of[r]] * joint.compliance[r]);
@@ -261,8 +219,33 @@ void GraphSystem::apply_loop_torques(const SweepInput<double>& in) {
   }
 }
 
+void GraphSystem::known_wrenches(int n, double* w) const {
+  const Vector6<double> own = to_array(g_[n]);
+  std::copy(own.begin(), own.end(), w);
+  if (!boxes_.has(n)) return;
+  const int carried = boxes_.carried_by(n);
+  Vector6<double> on_port{};
+  if (carried >= 0 && is_massless_[carried]) on_port = to_array(g_[carried]);
+  std::copy(on_port.begin(), on_port.end(), w + 6);
+}
+
+void GraphSystem::accelerate(int n, const double* w) {
+  double* const a = motion({n, 0});
+  const double* const C = A_.compliance(n);
+  if (boxes_.has(n)) return boxes_.accelerate(n, C, w, a);
+  for (int i = 0; i < 6; ++i) {
+    a[i] = 0;
+    for (int j = 0; j < 6; ++j) a[i] += C[6 * i + j] * w[j];
+  }
+}
+
 void GraphSystem::finish_b() {
-  for (int n = 0; n < model_->n_bodies(); ++n) a_[n] = compliance_[n] * g_[n];
+  for (int n = 0; n < model_->n_bodies(); ++n) {
+    if (is_massless_[n]) continue;
+    double w[12];
+    known_wrenches(n, w);
+    accelerate(n, w);
+  }
   for (int i = 0; i < A_.n(); ++i)
     for (int r = A_.offset[i]; r < A_.offset[i + 1]; ++r) {
       const double sum = row_of_accelerations(i, r);
@@ -295,22 +278,26 @@ void GraphSystem::add_forces(const std::vector<double>& f) {
 
 void GraphSystem::calc_accelerations(const std::vector<double>& f) {
   for (int n = 0; n < model_->n_bodies(); ++n) {
-    Vector6<double> w = to_array(g_[n]);
+    if (is_massless_[n]) continue;
+    double w[12];
+    known_wrenches(n, w);
+    const int width = A_.width(n);
     for (int e = A_.hub_begin[n]; e < A_.hub_begin[n + 1]; ++e) {
       const double* row = A_.levers.data() + A_.lever_begin[e];
       const int node = A_.end_node[e];
-      for (int r = A_.offset[node]; r < A_.offset[node + 1]; ++r, row += 6)
-        for (int k = 0; k < 6; ++k) w[k] += f[r] * row[k];
+      for (int r = A_.offset[node]; r < A_.offset[node + 1]; ++r, row += width)
+        for (int k = 0; k < width; ++k) w[k] += f[r] * row[k];
     }
-    a_[n] = compliance_[n] * to_force(w.data());
+    accelerate(n, w);
   }
 }
 
 Vector6<double> GraphSystem::relative_acceleration(int n) const {
   const int parent = model_->topology[n].parent;
-  Motion<double> of_parent = state_[n].X * (parent >= 0 ? a_[parent] : ground_);
+  Motion<double> of_parent = state_[n].X * (parent >= 0 ? acceleration(parent) : ground_);
   if (with_bias_) of_parent += state_[n].c;
-  return to_array(Motion<double>{a_[n].lin - of_parent.lin, a_[n].ang - of_parent.ang});
+  const Motion<double> own = acceleration(n);
+  return to_array(Motion<double>{own.lin - of_parent.lin, own.ang - of_parent.ang});
 }
 
 void GraphSystem::recover(const SweepInput<double>& in, const std::vector<double>& f, double* du,
@@ -327,7 +314,10 @@ void GraphSystem::recover(const SweepInput<double>& in, const std::vector<double
       du[joint_[n].dof[i]] = sum;
     }
     copy_prescribed(*model_, model_->topology[n], in, du);
+    if (boxes_.has(n))
+      std::copy_n(boxes_.accelerations(n), boxes_.count(n), du + own_place(*model_, n));
   }
+  carry_massless();
   calc_violation();
   if (loads) store_loads(in.q, loads);
 }
@@ -337,9 +327,11 @@ double GraphSystem::row_of_accelerations(int i, int r) const {
   double sum = 0;
   for (int at = A_.node_begin[i]; at < A_.node_begin[i + 1]; ++at) {
     const int e = A_.node_ends[at];
-    const Vector6<double> a = to_array(a_[A_.end_hub[e]]);
-    const double* const row = A_.levers.data() + A_.lever_begin[e] + 6 * size_t(r - A_.offset[i]);
-    for (int k = 0; k < 6; ++k) sum += row[k] * a[k];
+    const int width = A_.width(A_.end_hub[e]);
+    const double* const a = motion({A_.end_hub[e], 0});
+    const double* const row =
+        A_.levers.data() + A_.lever_begin[e] + static_cast<size_t>(width) * (r - A_.offset[i]);
+    for (int k = 0; k < width; ++k) sum += row[k] * a[k];
   }
   return sum;
 }
@@ -351,9 +343,15 @@ void GraphSystem::calc_violation() {
       if (A_.own[r] > 0) continue;
       worst = std::max(worst, std::abs(r_[r] - row_of_accelerations(i, r)));
     }
-  for (const Motion<double>& a : a_)
-    for (const double x : to_array(a)) largest = std::max(largest, std::abs(x));
+  for (const double x : a_) largest = std::max(largest, std::abs(x));
   violation_ = largest > 0 ? worst / largest : 0;
+}
+
+/// And of the port that carries a body.
+void GraphSystem::set_acceleration(int n, const Motion<double>& a) {
+  const Vector6<double> x = to_array(a);
+  std::copy(x.begin(), x.end(), motion(site_of(n)));
+  if (on_port(*model_, model_->topology[n])) std::copy(x.begin(), x.end(), motion(site_inboard(n)));
 }
 
 /// a_ by du alone, and what joints of the tree transmit then: w_.
@@ -361,17 +359,20 @@ void GraphSystem::calc_motion(const double* du) {
   const Model& model = *model_;
   for (int n = 0; n < model.n_bodies(); ++n) {
     const BodyTopology& body = model.topology[n];
-    Motion<double> a = state_[n].X * (body.parent >= 0 ? a_[body.parent] : ground_);
+    Motion<double> a = state_[n].X * (body.parent >= 0 ? acceleration(body.parent) : ground_);
     a += state_[n].c;
     const auto add = [&](const Motion<double>& P, double x) { a += x * P; };
     if (body.general >= 0) {
       const GeneralState<double>& joint = general_[body.general];
       for (int k = 0; k < joint.n; ++k) add(joint.P[k], du[joint.dof[k]]);
+      if (on_port(model, body))
+        boxes_.add_port_rate(body.parent, du + own_place(model, body.parent), a);
     } else {
       add(element_column<double>(model.elements[body.first_element], 0), du[body.v]);
     }
-    a_[n] = a;
-    w_[n] = inertia_times(model.constants[n].rigid, a);
+    set_acceleration(n, a);
+    w_[n] = boxes_.has(n) ? boxes_.inertia_times(n, a, du + own_place(model, n))
+                          : inertia_times(model.constants[n].rigid, a);
     w_[n] += state_[n].bias;
   }
   for (int l = 0; l < model.n_loops(); ++l) {
@@ -402,6 +403,10 @@ void GraphSystem::calc_torques_missed(const SweepInput<double>& in, const std::v
     } else {
       add(element_column<double>(model.elements[body.first_element], 0), body.v);
     }
+    if (!boxes_.has(n)) continue;
+    const int v = own_place(model, n), carried = boxes_.carried_by(n);
+    const Force<double> w_port = carried >= 0 ? -1.0 * w_[carried] : Force<double>{};
+    boxes_.calc_forces_missed(in, n, acceleration(n), du + v, w_port, tau_.data() + v);
   }
   for (int c = 0; c < model.n_couplings(); ++c)
     for (size_t t = 0; t < slopes_[c].size(); ++t)
@@ -430,6 +435,8 @@ void GraphSystem::assemble_rest(const SweepInput<double>& in, const std::vector<
   with_bias_ = false;
   ground_ = {};
   std::fill(g_.begin(), g_.end(), Force<double>{});
+  for (int n = 0; n < model.n_bodies(); ++n)
+    if (boxes_.has(n)) boxes_.set_forces(n, tau_.data() + own_place(model, n));
   apply_torques(tau_.data());
   std::fill(size_.begin(), size_.end(), 0.0);
   finish_b();
@@ -442,8 +449,7 @@ void GraphSystem::calc_rest() {
     for (const double x : to_array(w)) load = std::max(load, std::abs(x));
   for (int r = A_.offset[model_->n_bodies()]; r < A_.size(); ++r)
     if (A_.own[r] == 0) open = std::max(open, std::abs(r_[r]));
-  for (const Motion<double>& a : a_)
-    for (const double x : to_array(a)) largest = std::max(largest, std::abs(x));
+  for (const double x : a_) largest = std::max(largest, std::abs(x));
   rest_ = std::max(load > 0 ? torque / load : torque, largest > 0 ? open / largest : open);
 }
 
@@ -456,9 +462,30 @@ void GraphSystem::add_rest(const SweepInput<double>& in, const std::vector<doubl
     const Vector6<double> relative = relative_acceleration(n);
     for (int i = 0; i < joint_[n].free; ++i)
       for (int r = 0; r < 6; ++r) du[joint_[n].dof[i]] += joint_[n].dual[i][r] * relative[r];
+    if (!boxes_.has(n)) continue;
+    const int v = own_place(*model_, n);
+    for (int k = 0; k < boxes_.count(n); ++k) du[v + k] += boxes_.accelerations(n)[k];
   }
+  carry_massless();
   for (size_t i = 0; i < f.size(); ++i) f[i] += df[i];
   if (loads) store_loads(in.q, loads);
+}
+
+void GraphSystem::carry_massless() {
+  const Model& model = *model_;
+  if (model.own_element.empty()) return;
+  for (int n = 0; n < model.n_bodies(); ++n)
+    if (is_massless_[n]) w_[n] = state_[n].bias;
+  for (int l = 0; l < model.n_loops(); ++l) {
+    const LoopJoint& at = model.loops.joints[l];
+    if (const int a = at.parent_body; a >= 0 && is_massless_[a])
+      w_[a] -= wrench_on_a(loops_[l], loop_w_[l]);
+    if (const int b = at.joint.body; b >= 0 && is_massless_[b])
+      w_[b] -= wrench_on_b(at, loop_w_[l]);
+  }
+  for (int n = model.n_bodies(); n-- > 0;)
+    if (const int parent = model.topology[n].parent; parent >= 0 && is_massless_[parent])
+      w_[parent] += transpose_times(state_[n].X, w_[n]);
 }
 
 void GraphSystem::store_loads(const double* q, double* loads) const {

@@ -46,6 +46,7 @@ inline int constraint_rows(const Model& model, int n) {
   int rows = 6;
   for (int i = 0; i < body.n_elements; ++i) {
     const Element& e = model.elements[body.first_element + i];
+    if (e.kind == ElementKind::elastic) continue;  // its coordinates are the parent's
     for (int k = 0; k < e.nv; ++k)
       if (!e.prescribed && !(armature[e.v + k] > 0)) --rows;
   }

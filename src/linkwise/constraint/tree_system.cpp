@@ -21,6 +21,10 @@ TreeSystem::TreeSystem(const Model& model, const Executor& executor)
       off_(model.n_bodies()),
       moved_(model.n_bodies()) {
   refuse_loops(model, "A f = b of a tree");
+  if (!model.own_element.empty())
+    throw InputError("A f = b of a tree" + model.where() +
+                     " takes rigid bodies, and this machine has flexible links; use method "
+                     "constraint_force");
   require_regular_inertias(model);
   std::vector<int> parent, dim;
   const auto& armature = model.dof_values(DofProperty::armature);

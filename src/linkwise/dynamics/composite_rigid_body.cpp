@@ -4,7 +4,7 @@
 #include <new>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/recursion/tolerances.hpp"
+#include "linkwise/base/tolerances.hpp"
 #include "linkwise/spatial/composite.hpp"
 
 namespace linkwise {

@@ -111,7 +111,8 @@ std::unique_ptr<DynamicsMethod> make_articulated_body(const Model& model,
 
 std::unique_ptr<DynamicsMethod> make_constraint_force(const Model& model,
                                                       const DynamicsOptions& options) {
-  if (model.is_constrained()) return std::make_unique<LoopedConstraintForce>(model, options);
+  if (model.is_constrained() || !model.own_element.empty())
+    return std::make_unique<LoopedConstraintForce>(model, options);
   if (options.solver == "thomas" && !ask_for_refinement(options.solver_options))
     return std::make_unique<FusedConstraintForce>(model);
   return std::make_unique<ConstraintForce>(model, options);
@@ -131,6 +132,7 @@ constexpr DynamicsEntry table[] = {
      .description = "joint constraint forces from A f = b with any linear solver",
      .reference = "sharf1993",
      .uses_solver = true,
+     .own_coordinates = true,
      .linear_time = true,
      .takes_loops = true,
      .on_lanes = BatchMethod::constraint_force,
@@ -214,12 +216,13 @@ void choose_for_loops(const Model& model, Choice& choice) {
     choice.reason = "closed loops, of which the recursion carries the forces to where they meet";
 }
 
-/// A machine with closed loops is a graph, which few solvers take.
-void require_solver_of_loops(const std::string& solver) {
-  if (!find_solver(solver).takes_loops)
-    throw InputError("solver '" + solver +
-                     "' takes trees, and this machine has closed loops or couplings; use solver "
-                     "thomas or conjugate_gradient");
+/// A machine with closed loops or flexible links is a graph, which few solvers take.
+void require_solver_of_graphs(const Model& model, const std::string& solver) {
+  if (find_solver(solver).takes_loops) return;
+  const char* const has = model.is_constrained()
+                              ? "takes trees, and this machine has closed loops or couplings"
+                              : "takes rigid bodies, and this machine has flexible links";
+  throw InputError("solver '" + solver + "' " + has + "; use solver thomas or conjugate_gradient");
 }
 
 }  // namespace
@@ -262,7 +265,8 @@ Choice choose_dynamics(const Model& model, const DynamicsOptions& options) {
     choice.solver = "";
   else if (choice.solver == "auto")
     choice.solver = "thomas";
-  if (entry.uses_solver && model.is_constrained()) require_solver_of_loops(choice.solver);
+  if (entry.uses_solver && (model.is_constrained() || !model.own_element.empty()))
+    require_solver_of_graphs(model, choice.solver);
   if (model.is_constrained() && !model.bearings.empty() && choice.method != "articulated_body")
     throw InputError("method " + choice.method +
                      " shares no loads among bearings; use method articulated_body, or remove the "

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "linkwise/base/error.hpp"
-#include "linkwise/recursion/tolerances.hpp"
+#include "linkwise/base/tolerances.hpp"
 
 namespace linkwise {
 GlobalProjection::GlobalProjection(const Model& model)

@@ -8,15 +8,14 @@ namespace {
 
 bool takes(const DynamicsEntry& method, BodyKind kind) {
   if (kind == BodyKind::rigid) return true;
-  return method.any_body &&
-         (method.own_coordinates || !BodyKinds::with_coordinates[static_cast<int>(kind)]);
+  return BodyKinds::with_coordinates[static_cast<int>(kind)] ? method.own_coordinates
+                                                             : method.any_body;
 }
 
 }  // namespace
 
 void require_known_bodies(const Model& model, const DynamicsEntry& method) {
   if (!model.own_element.empty()) refuse_loops(model, "a body with coordinates of its own");
-  if (method.own_coordinates) return;
   for (int n = 0; n < model.n_bodies(); ++n) {
     const BodyKind kind = model.topology[n].body_kind;
     if (takes(method, kind)) continue;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "linkwise/constraint/graph_system.hpp"
+#include "linkwise/constraint/constraint_graph.hpp"
 #include "linkwise/dynamics/loop_groups.hpp"
 #include "linkwise/solve/direct/graph_factor.hpp"
 

@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "linkwise/base/finite.hpp"
+#include "linkwise/base/tolerances.hpp"
 #include "linkwise/dynamics/loop_wrenches.hpp"
-#include "linkwise/recursion/tolerances.hpp"
 
 namespace linkwise {
 namespace {
@@ -68,6 +68,11 @@ DynamicsReport LoopedConstraintForce::evaluate(double, const SweepInput<double>&
   const double gap = widest_miss(system_.loops(), false);
   loops_.open = std::max(gap, widest_miss(system_.loops(), true));
   DynamicsReport report;
+  if (!system_.is_regular()) {
+    report.outcome =
+        system_.A().all_finite() ? Outcome::not_positive_definite : Outcome::not_finite;
+    return report;
+  }
   if (factor_) report.node = factor_->factor(system_.A(), null_pivot(gap), least);
   if (report.node >= 0)
     report.outcome =

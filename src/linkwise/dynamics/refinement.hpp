@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
+#include "linkwise/base/tolerances.hpp"
 #include "linkwise/dynamics/inverse_dynamics.hpp"
-#include "linkwise/recursion/tolerances.hpp"
 
 namespace linkwise {
 

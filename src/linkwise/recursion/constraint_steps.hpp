@@ -19,9 +19,9 @@
 #include <cmath>
 #include <type_traits>
 
+#include "linkwise/base/tolerances.hpp"
 #include "linkwise/kinematics/placement.hpp"
 #include "linkwise/recursion/steps.hpp"
-#include "linkwise/recursion/tolerances.hpp"
 #include "linkwise/spatial/matrix6.hpp"
 
 namespace linkwise {

@@ -3,8 +3,8 @@
 //     m_e du = tau - p_e - M_e^T a,
 //     Y = M - M_e m_e^-1 M_e^T,  p = p + M_e m_e^-1 (tau - p_e),
 // after which the joint inboard sees an ordinary body. Formulas: docs/theory/flexible.md.
+#include "linkwise/base/tolerances.hpp"
 #include "linkwise/bodies/own_coordinates.hpp"
-#include "linkwise/recursion/tolerances.hpp"
 #include "linkwise/simd/cholesky.hpp"
 #include "linkwise/spatial/matrix6.hpp"
 

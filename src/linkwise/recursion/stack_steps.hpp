@@ -2,9 +2,9 @@
 // The steps of steps.hpp for joints of several axes or none, the stacks of elements: U and P are up
 // to six columns and D is a matrix, kept as its Cholesky factor. A floating joint without rotors
 // has P = 1; its steps are last.
+#include "linkwise/base/tolerances.hpp"
 #include "linkwise/kinematics/body_state.hpp"
 #include "linkwise/recursion/steps.hpp"
-#include "linkwise/recursion/tolerances.hpp"
 #include "linkwise/spatial/matrix6.hpp"
 
 namespace linkwise {

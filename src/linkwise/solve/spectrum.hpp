@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "linkwise/linear/scaled_tree.hpp"
+#include "linkwise/solve/iterative/knot_jacobi.hpp"
 #include "linkwise/solve/options.hpp"
 
 namespace linkwise {
@@ -48,6 +49,10 @@ class SpectrumEstimator {
   std::vector<double> v_, previous_, w_;
   std::vector<double> diagonal_, off_diagonal_;
 };
+
+/// Of P^-1 A, P factored.
+Spectrum estimate_spectrum(const BlockGraph& A, const KnotJacobi& P,
+                           const SpectrumOptions& options = {});
 
 /// Scales A and estimates.
 Spectrum estimate_spectrum(const BlockTree& A, const SpectrumOptions& options = {});

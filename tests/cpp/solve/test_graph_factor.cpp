@@ -9,13 +9,16 @@
 #include "linkwise/linear/semidefinite.hpp"
 #include "linkwise/solve/direct/graph_factor.hpp"
 #include "linkwise/solve/iterative/graph_conjugate_gradient.hpp"
+#include "linkwise/solve/spectrum.hpp"
 
 namespace linkwise::testing {
 namespace {
 
-/// Nodes of 0 to 6 rows on one to three of some hubs. singular: every third node is one before it
-/// once more.
+/// Nodes of 0 to 6 rows on one to three of some hubs, of which some are wide. singular: every third
+/// node is one before it once more, and no hub is wide.
 BlockGraph random_graph(int nodes, int hubs, bool singular, Draws& draws) {
+  std::vector<char> is_wide(hubs);
+  for (char& wide : is_wide) wide = !singular && draws.below(3) == 0;
   std::vector<int> dims;
   std::vector<std::vector<int>> of_node;
   for (int i = 0; i < nodes; ++i) {
@@ -32,15 +35,16 @@ BlockGraph random_graph(int nodes, int hubs, bool singular, Draws& draws) {
     }
   }
   BlockGraph A;
-  A.set_structure(dims, of_node);
+  A.set_structure(dims, of_node, is_wide);
   for (double& x : A.levers) x = draws.normal();
-  for (Block& C : A.compliance) {
-    Block root;
-    for (double& x : root) x = draws.normal();
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j) {
-        C[6 * i + j] = i == j;
-        for (int k = 0; k < 6; ++k) C[6 * i + j] += root[6 * i + k] * root[6 * j + k];
+  for (int hub = 0; hub < A.n_hubs(); ++hub) {
+    const int w = A.width(hub);
+    double root[144], *const C = A.compliance(hub);
+    for (int i = 0; i < w * w; ++i) root[i] = draws.normal();
+    for (int i = 0; i < w; ++i)
+      for (int j = 0; j < w; ++j) {
+        C[w * i + j] = i == j;
+        for (int k = 0; k < w; ++k) C[w * i + j] += root[w * i + k] * root[w * j + k];
       }
   }
   for (int i = 0; i < nodes; ++i) {
@@ -154,6 +158,105 @@ TEST(GraphFactor, SolvesAsOneDenseMatrix) {
     for (int i = 0; i < A.size(); ++i)
       EXPECT_NEAR(x[i], want[i], 1e-6 * std::max(1.0, largest(want))) << i;
   }
+}
+
+/// Wide hubs in a row, each with a joint at either end; a knot between two of them where `knots`.
+BlockGraph chain_of_wide_hubs(int n, bool knots, Draws& draws) {
+  std::vector<int> dims;
+  std::vector<std::vector<int>> of_node;
+  const int step = knots ? 2 : 1;
+  std::vector<char> is_wide(step * n);
+  for (int i = 0; i < n; ++i) is_wide[step * i] = 1;
+  for (int hub = 0; hub < step * n; ++hub) {
+    dims.push_back(1 + draws.below(3));
+    of_node.push_back({hub});
+    if (hub > 0) of_node.back().push_back(hub - 1);
+  }
+  BlockGraph A;
+  A.set_structure(dims, of_node, is_wide);
+  for (double& x : A.levers) x = draws.normal();
+  for (int hub = 0; hub < A.n_hubs(); ++hub) {
+    const int w = A.width(hub);
+    double* const C = A.compliance(hub);
+    for (int i = 0; i < w; ++i) C[(w + 1) * i] = draws.uniform(0.5, 2);
+  }
+  return A;
+}
+
+// Column by column, against P put together from what each body adds.
+TEST(KnotJacobi, SolvesWhatItsBodiesAddUpTo) {
+  for (const bool knots : {false, true}) {
+    Draws draws(11);
+    const BlockGraph A = chain_of_wide_hubs(6, knots, draws);
+    KnotJacobi jacobi;
+    ASSERT_EQ(jacobi.factor(A), -1);
+    const auto n = static_cast<size_t>(A.size());
+    std::vector<double> P(n * n), unit(n), column(n), room;
+    for (int hub = 0; hub < A.n_hubs(); ++hub) {
+      BlockGraph alone = A;
+      for (int other = 0; other < A.n_hubs(); ++other)
+        if (const int w = A.width(other); other != hub)
+          std::fill_n(alone.compliance(other), w * w, 0.0);
+      for (int node = 0; node < A.n(); ++node)
+        for (int j = A.offset[node]; j < A.offset[node + 1]; ++j) {
+          unit[j] = 1;
+          alone.multiply(unit, column, room);
+          unit[j] = 0;
+          const bool whole = A.width(hub) == 6;
+          for (size_t i = 0; i < n; ++i)
+            if (whole ||
+                (static_cast<int>(i) >= A.offset[node] && static_cast<int>(i) < A.offset[node + 1]))
+              P[i * n + j] += column[i];
+        }
+    }
+    for (size_t j = 0; j < n; ++j) {
+      unit[j] = 1;
+      jacobi.solve(A, unit, column, Executor());
+      unit[j] = 0;
+      for (size_t i = 0; i < n; ++i) {
+        double back = 0;
+        for (size_t k = 0; k < n; ++k) back += P[i * n + k] * column[k];
+        EXPECT_NEAR(back, i == j, 1e-10);
+      }
+    }
+  }
+}
+
+TEST(KnotJacobi, BoundsTheSpectrum) {
+  for (int sample = 0; sample < 12; ++sample) {
+    SCOPED_TRACE(sample);
+    Draws draws(sample);
+    const BlockGraph A = chain_of_wide_hubs(12, sample % 2, draws);
+    KnotJacobi P;
+    ASSERT_EQ(P.factor(A), -1);
+    const KnotJacobi::Bound bound = P.bound(A);
+    const Spectrum found = estimate_spectrum(A, P);
+    EXPECT_GT(bound.smallest, 0);
+    EXPECT_GE(found.smallest, bound.smallest * (1 - 1e-9));
+    EXPECT_LE(found.largest, bound.largest * (1 + 1e-9));
+    EXPECT_LE(found.largest, 2);
+    std::vector<double> b(A.size()), x(A.size());
+    for (double& bi : b) bi = draws.normal();
+    SolverOptions options;
+    options.tolerance = 1e-7;
+    const Report report = GraphConjugateGradient(options).solve(A, b, x);
+    ASSERT_TRUE(report.ok());
+    EXPECT_LE(report.iterations, bound.iterations(options.tolerance));
+  }
+}
+
+// Six motions cannot hold ten rows apart.
+TEST(KnotJacobi, HasNoBoundForRigidChains) {
+  BlockGraph A;
+  A.set_structure(std::vector<int>{5, 5}, std::vector<std::vector<int>>{{0}, {0, 1}});
+  Draws draws(5);
+  for (double& x : A.levers) x = draws.normal();
+  for (int hub = 0; hub < 2; ++hub)
+    for (int i = 0; i < 6; ++i) A.compliance(hub)[7 * i] = 1;
+  KnotJacobi P;
+  ASSERT_EQ(P.factor(A), -1);
+  EXPECT_EQ(P.bound(A).smallest, 0);
+  EXPECT_TRUE(std::isinf(P.bound(A).iterations(1e-7)));
 }
 
 TEST(GraphFactor, SaysByHowMuchRowsContradictEachOther) {

@@ -188,6 +188,12 @@ int GraphFactor::factor(const BlockGraph& A, double null, bool least) {
 
 /// H C H^T of the ends of a hub, where D_A is 1.
 void GraphFactor::add_hub(const BlockGraph& A, int hub, const Step& step) {
+  with_width(A.width(hub), [&](auto width) { add_hub(A, hub, step, width); });
+}
+
+template <int w>
+void GraphFactor::add_hub(const BlockGraph& A, int hub, const Step& step,
+                          std::integral_constant<int, w>) {
   levers_.clear();
   local_.clear();
   const int* const rest = rest_.data() + step.rest;
@@ -196,12 +202,12 @@ void GraphFactor::add_hub(const BlockGraph& A, int hub, const Step& step) {
     const double* const L = &scaling_[21 * static_cast<std::size_t>(node)];
     const std::size_t first = levers_.size();
     levers_.insert(levers_.end(), A.levers.begin() + static_cast<std::ptrdiff_t>(A.lever_begin[e]),
-                   A.levers.begin() + static_cast<std::ptrdiff_t>(A.lever_begin[e] + 6 * rows));
+                   A.levers.begin() + static_cast<std::ptrdiff_t>(A.lever_begin[e] + w * rows));
     double* const H = levers_.data() + first;
     for (int r = 0; r < rows; ++r) {
       for (int l = 0; l < r; ++l)
-        for (int c = 0; c < 6; ++c) H[6 * r + c] -= L[packed(r, l)] * H[6 * l + c];
-      for (int c = 0; c < 6; ++c) H[6 * r + c] *= L[packed(r, r)];
+        for (int c = 0; c < w; ++c) H[w * r + c] -= L[packed(r, l)] * H[w * l + c];
+      for (int c = 0; c < w; ++c) H[w * r + c] *= L[packed(r, r)];
     }
     const int local =
         place < step.begin + step.pivots
@@ -211,16 +217,16 @@ void GraphFactor::add_hub(const BlockGraph& A, int hub, const Step& step) {
                                    rest);
     for (int r = 0; r < rows; ++r) local_.push_back(local + r);
   }
-  const Block& C = A.compliance[hub];
+  const double* const C = A.compliance(hub);
   const std::size_t n = local_.size();
   for (std::size_t j = 0; j < n; ++j) {
-    double y[6] = {};
-    for (int r = 0; r < 6; ++r)
-      for (int c = 0; c < 6; ++c) y[r] += C[6 * r + c] * levers_[6 * j + c];
+    double y[w] = {};
+    for (int r = 0; r < w; ++r)
+      for (int c = 0; c < w; ++c) y[r] += C[w * r + c] * levers_[w * j + c];
     for (std::size_t i = 0; i < n; ++i) {
       if (local_[i] < local_[j]) continue;
       double sum = 0;
-      for (int c = 0; c < 6; ++c) sum += levers_[6 * i + c] * y[c];
+      for (int c = 0; c < w; ++c) sum += levers_[w * i + c] * y[c];
       front_[static_cast<std::size_t>(local_[j]) * step.rows + local_[i]] += sum;
     }
   }

@@ -47,6 +47,8 @@ class GraphFactor {
   void factor_fronts(const BlockGraph& A, double null, double shift, std::vector<double>& L,
                      std::vector<double>& inverse);
   void add_hub(const BlockGraph& A, int hub, const Step& step);
+  template <int w>
+  void add_hub(const BlockGraph& A, int hub, const Step& step, std::integral_constant<int, w>);
   void solve_once(const std::vector<double>& L, const std::vector<double>& inverse, double* x);
   void to_scaled(const double* b, double* x) const;
   void from_scaled(const double* x, double* out) const;

@@ -4,33 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "linkwise/base/packed.hpp"
-#include "linkwise/exec/tiles.hpp"
-#include "linkwise/simd/cholesky.hpp"
-
 namespace linkwise {
-
-/// Returns the node whose block is not positive definite, or -1.
-int GraphConjugateGradient::factor_diagonal(const BlockGraph& A) {
-  diagonal_.resize(21 * static_cast<std::size_t>(A.n()));
-  for (int i = 0; i < A.n(); ++i) {
-    double* const L = &diagonal_[21 * static_cast<std::size_t>(i)];
-    A.calc_diagonal(i, L);
-    if (A.dim(i) == 1 && L[0] == 0) L[0] = 1;  // a row that holds nothing
-    if (!cholesky_factor(A.dim(i), L, 0.0)) return i;
-  }
-  return -1;
-}
-
-void GraphConjugateGradient::precondition(const BlockGraph& A, std::span<const double> r,
-                                          std::span<double> z) const {
-  std::copy(r.begin(), r.end(), z.begin());
-  Tiles(A.n(), TileOf::nodes).for_each(options_.executor, [&](int, int begin, int end) {
-    for (int i = begin; i < end; ++i)
-      cholesky_solve(A.dim(i), &diagonal_[21 * static_cast<std::size_t>(i)],
-                     z.data() + A.offset[i]);
-  });
-}
 
 Report GraphConjugateGradient::solve(const BlockGraph& A, std::span<const double> b,
                                      std::span<double> x) {
@@ -39,7 +13,7 @@ Report GraphConjugateGradient::solve(const BlockGraph& A, std::span<const double
   std::fill(x.begin(), x.end(), 0.0);
   const double size_of_b = sum_of_squares(b, executor);
   if (!std::isfinite(size_of_b)) report.outcome = Outcome::not_finite;
-  report.node = factor_diagonal(A);
+  report.node = P_.factor(A);
   if (report.node >= 0)
     report.outcome = A.all_finite() ? Outcome::not_positive_definite : Outcome::not_finite;
   if (!report.ok()) report.error_estimate = std::numeric_limits<double>::infinity();
@@ -65,7 +39,7 @@ void GraphConjugateGradient::iterate(const BlockGraph& A, std::span<const double
       b, x, stop_, work_,
       [&](std::span<const double> v, std::span<double> w) { A.multiply(v, w, motions_, executor); },
       [&](std::span<const double> r, std::span<double> z) -> std::span<const double> {
-        precondition(A, r, z);
+        P_.solve(A, r, z, executor);
         return z;
       },
       executor);
@@ -83,7 +57,7 @@ void GraphConjugateGradient::verify(const BlockGraph& A, std::span<const double>
   while (true) {
     A.multiply(x, left_, motions_, executor);
     subtract_from(b, left_, executor);
-    precondition(A, left_, more_);
+    P_.solve(A, left_, more_, executor);
     const double square = std::max(0.0, dot(left_, more_, executor)) / stop_.smallest_eigenvalue();
     if (square <= bound * bound) {
       report.outcome = Outcome::converged;

@@ -1,5 +1,5 @@
 #pragma once
-// The two numbers by which the recursions judge their rounding errors.
+// The two numbers by which the sweeps and systems judge their rounding errors.
 
 namespace linkwise {
 
