@@ -315,6 +315,35 @@ def test_bad_input_is_one_line(run):
         assert "\n" not in str(caught.value)
 
 
+def test_batches_go_member_by_member():
+    """Members in front; each as a run of its own."""
+    options = {"duration": 0.05, "every": 0.01, "integrator": "runge_kutta_4", "step": 1e-4}
+    model = crane(1, interior_modes=0, stretches=False)
+    v0 = np.zeros((2, model.nv))
+    v0[1, model.v_slice("slew")] = 0.5
+    batch = lw.simulate_batch(model, v0=v0, **options)
+    alone = lw.simulate(model, v0=v0[1], **options)
+    for function in (
+        lw.loads.section_loads,
+        lw.loads.section_summary,
+        lw.loads.section_split,
+        lw.loads.section_deflections,
+    ):
+        both, one = function(batch, "jib", 3, model), function(alone, "jib", 3)
+        if function is lw.loads.section_summary:
+            rating = lw.loads.SectionRating(stress=2e8, ny=1e5)
+            use = lw.loads.section_margins(both, rating).use
+            assert use.dims == ("member", "quantity")
+            want = lw.loads.section_margins(one, rating).use.values
+            assert use[1].values == pytest.approx(want, rel=1e-6)
+        if hasattr(both, "data_vars"):
+            name = next(iter(one.data_vars))
+            both, one = both[name], one[name]
+        assert both.dims == ("member", *one.dims)
+        scale = float(abs(one).max())
+        assert both[1].values == pytest.approx(one.values, abs=1e-6 * scale)
+
+
 def test_rows_are_found_by_the_name_that_was_made_flexible():
     assert beams_of(crane(3)) == {"jib": ["jib", "jib:2", "jib:3"]}
     assert beams_of(lw.scenes.chain(3)) == {}

@@ -61,7 +61,7 @@ def show_sections(
     allowed = section_ratings_in(str(run.dataset.attrs.get("scenario", "")))
     found, made, rows = [], [], []
     for link in dict.fromkeys(links):
-        summary = section_summary(run, link, count)
+        summary = section_summary(run, link, count, model)
         records = _peaks(summary)
         if link in allowed:
             margins = section_margins(summary, allowed[link])
@@ -70,7 +70,7 @@ def show_sections(
                     own = margins.sel(quantity=record["quantity"])
                     record |= {key: float(own[key]) for key in ("rating", "use", "margin")}
         if split is not None:
-            _add_causes(run, link, count, records)
+            _add_causes(run, model, link, count, records)
         along = _along(summary)
         found.append({"link": link, "peaks": records, "along": along})
         rows += [{"link": link, **row} for row in along]
@@ -118,13 +118,15 @@ def _peaks(summary: xr.Dataset) -> list[dict[str, Any]]:
     ]
 
 
-def _add_causes(run: Run, link: str, n: int, records: list[dict[str, Any]]) -> None:
+def _add_causes(
+    run: Run, model: Model, link: str, n: int, records: list[dict[str, Any]]
+) -> None:
     """What each cause adds to the peaks of components."""
     import numpy as np
 
     from linkwise.loads import section_split
 
-    shares = section_split(run, link, n)
+    shares = section_split(run, link, n, model)
     times, x = shares["time"].values, shares["x"].values
     for record in records:
         if record["quantity"] not in shares["component"].values:

@@ -8,22 +8,28 @@ import numpy as np
 
 from linkwise.base import Array
 from linkwise.loads.bent import check_count, row_of, section_frames, spread
+from linkwise.loads.members import each_member
 from linkwise.loads.samples import blocks, model_of, need_whole, rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.loads.samples import RunLike
+    from linkwise.loads.members import each_member
+from linkwise.loads.samples import RunLike
 
 
-def section_deflections(run: RunLike, link: str, n: int = 11) -> xr.Dataset:
+@each_member
+def section_deflections(
+    run: RunLike, link: str, n: int = 11, model: Model | None = None
+) -> xr.Dataset:
     """Where sections of an elastic link are, and how it is bent.
 
     Args:
         run: recorded with position of all joints.
         link: an elastic link, by the name under which it was made flexible.
         n: how many sections, evenly from its start to its end.
+        model: the machine, if the run does not hold it.
 
     Returns:
         A dataset with `deflection` (time, section, axis) [m], from where the section would be if
@@ -37,23 +43,23 @@ def section_deflections(run: RunLike, link: str, n: int = 11) -> xr.Dataset:
     """
     import xarray as xr
 
-    model = model_of(run, None)
-    row = row_of(model, link)
-    links, places, x = spread(row, model.beam_lengths, check_count(n))
-    need_whole(run, model, "position", "joint_load")
+    machine = model_of(run, model)
+    row = row_of(machine, link)
+    links, places, x = spread(row, machine.beam_lengths, check_count(n))
+    need_whole(run, machine, "position", "joint_load")
     times = np.asarray(run.dataset["time"], dtype=float)
     deflection, turn, point = (np.empty((times.size, len(x), 3)) for _ in range(3))
     energy = np.empty(times.size)
-    for block in blocks(run, 8 * (model.nq + 40 * len(x) + 16 * len(model.link_names))):
+    for block in blocks(run, 8 * (machine.nq + 40 * len(x) + 16 * len(machine.link_names))):
         q = rows(run, "position", block)
-        frames, _ = section_frames(model, links, places, q)
+        frames, _ = section_frames(machine, links, places, q)
         start = frames[:, :1]
         point[block] = frames[..., :3, 3]
         along = (frames[..., :3, 3] - start[..., :3, 3]) @ start[:, 0, :3, :3]
         along[..., 0] -= x
         deflection[block] = along
         turn[block] = rotation_vectors(start[..., :3, :3].swapaxes(-1, -2) @ frames[..., :3, :3])
-        energy[block] = strain_energy(model, link, len(row), q)
+        energy[block] = strain_energy(machine, link, len(row), q)
     dims = ("time", "section", "axis")
     own = {"frame": "axes of the beam at its start"}
     data: dict[str, Any] = {

@@ -12,11 +12,13 @@ from linkwise._core import InputError
 from linkwise.base import COMPONENTS, Array
 from linkwise.io.complaint import near, shown
 from linkwise.loads.fatigue import EXPONENTS, checked_exponents, checked_repetitions, ranges_of
+from linkwise.loads.members import each_member
 from linkwise.loads.sections import Sections, extreme_stress, fibres, stress_at
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from linkwise._core import Model
     from linkwise.loads.samples import RunLike
 
 STRESS = "stress"
@@ -32,11 +34,12 @@ LONG_NAMES = {
 }
 
 
-def section_summary(run: RunLike, link: str, n: int = 11) -> xr.Dataset:
+@each_member
+def section_summary(run: RunLike, link: str, n: int = 11, model: Model | None = None) -> xr.Dataset:
     """The largest loads inside an elastic link, where and when, and the envelope along it.
 
     Args:
-        run, link, n: As for `section_loads`.
+        run, link, n, model: As for `section_loads`.
 
     Returns:
         Dataset over `quantity`, the components fx ... nz and `stress`, where the outer sizes of the
@@ -50,7 +53,7 @@ def section_summary(run: RunLike, link: str, n: int = 11) -> xr.Dataset:
     """
     import xarray as xr
 
-    of = Sections(run, link, n)
+    of = Sections(run, link, n, model)
     names = [*COMPONENTS, *([STRESS] if fibres(of.section) is not None else [])]
     shape = (of.n, len(names))
     low, high = np.full(shape, np.inf), np.full(shape, -np.inf)
@@ -115,17 +118,19 @@ def _stress_error(error: Array, section: dict[str, Any]) -> Array:
     return extreme_stress(off, section)[1]
 
 
+@each_member
 def section_damage(
     run: RunLike,
     link: str,
     n: int = 11,
     exponents: Sequence[float] = EXPONENTS,
     repetitions: float | None = None,
+    model: Model | None = None,
 ) -> xr.DataArray:
     """Damage-equivalent ranges of the loads inside an elastic link.
 
     Args:
-        run, link, n: As for `section_loads`.
+        run, link, n, model: As for `section_loads`.
         exponents: Slopes m of the Woehler lines, N ~ S^-m.
         repetitions: Number N of equal cycles; one per second of the run by default (1 Hz).
 
@@ -139,7 +144,7 @@ def section_damage(
     """
     import xarray as xr
 
-    of = Sections(run, link, n)
+    of = Sections(run, link, n, model)
     slopes = checked_exponents(exponents)
     count = checked_repetitions(of.times, repetitions)
     outside = fibres(of.section)
@@ -228,16 +233,17 @@ def section_margins(summary: xr.Dataset, rating: SectionRating) -> xr.Dataset:
                 f"sizes; give Section(width=, height=) or rate {near(name, known)}"
             )
     names = [name for name in known if name in rated]
-    here = summary.sel(quantity=names)
+    here = summary.sel(quantity=names).transpose(..., "quantity")
     limits = np.array([rated[name] for name in names])
     peak = np.abs(here["peak"].values) + np.nan_to_num(here["peak_error"].values)
     with np.errstate(divide="ignore"):
         margin = limits / peak - 1
+    dims = here["peak"].dims
     data: Mapping[str, Any] = {
         "rating": ("quantity", limits, {"long_name": "rating", "units": "of the quantity"}),
-        "use": ("quantity", peak / limits, {"long_name": "peak over rating", "units": "1"}),
-        "margin": ("quantity", margin, {"long_name": "rating over peak, less 1", "units": "1"}),
-        "peak_x": ("quantity", here["peak_x"].values, {"units": "m"}),
-        "peak_time": ("quantity", here["peak_time"].values, {"units": "s"}),
+        "use": (dims, peak / limits, {"long_name": "peak over rating", "units": "1"}),
+        "margin": (dims, margin, {"long_name": "rating over peak, less 1", "units": "1"}),
+        "peak_x": (dims, here["peak_x"].values, {"units": "m"}),
+        "peak_time": (dims, here["peak_time"].values, {"units": "s"}),
     }
     return xr.Dataset(data, coords={"quantity": names}, attrs={"link": summary.attrs["link"]})

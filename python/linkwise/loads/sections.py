@@ -11,13 +11,15 @@ from linkwise import _core
 from linkwise.base import COMPONENTS, Array
 from linkwise.loads.bent import beams_of, check_count, row_of, spread
 from linkwise.loads.causes import CAUSES, Split
+from linkwise.loads.members import each_member
 from linkwise.loads.samples import blocks, model_of, need_whole, rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from linkwise._core import Model
-    from linkwise.loads.samples import RunLike
+    from linkwise.loads.members import each_member
+from linkwise.loads.samples import RunLike
 
 _AXES = "axes of the bent section: x along the beam, y and z its own"
 _SIGN = "inboard part on outboard part"
@@ -31,8 +33,8 @@ class Sections:
     section: what it is made of, as `_core.beam_properties` says.
     """
 
-    def __init__(self, run: RunLike, link: str, n: int) -> None:
-        self.run, self.model = run, model_of(run, None)
+    def __init__(self, run: RunLike, link: str, n: int, model: Model | None = None) -> None:
+        self.run, self.model = run, model_of(run, model)
         row = row_of(self.model, link)
         self.links, self.places, self.x = spread(row, self.model.beam_lengths, check_count(n))
         need_whole(run, self.model, *STATE)
@@ -108,7 +110,8 @@ def extreme_stress(load: Array, section: dict[str, Any]) -> tuple[Array, Array]:
     return axial - bending, axial + bending
 
 
-def section_loads(run: RunLike, link: str, n: int = 11) -> xr.Dataset:
+@each_member
+def section_loads(run: RunLike, link: str, n: int = 11, model: Model | None = None) -> xr.Dataset:
     """The load at sections of an elastic link, by equilibrium of all that is outboard of each.
 
     Signs are those of joint loads: what the inboard part puts on the outboard part, so tension is
@@ -119,6 +122,7 @@ def section_loads(run: RunLike, link: str, n: int = 11) -> xr.Dataset:
         run: recorded with position, velocity, acceleration and joint_load of all joints.
         link: an elastic link, by the name under which it was made flexible.
         n: how many sections, evenly from its start to its end.
+        model: the machine, if the run does not hold it.
 
     Returns:
         A dataset with section_load (time, section, component) [N, N m] in the axes of the bent
@@ -133,7 +137,7 @@ def section_loads(run: RunLike, link: str, n: int = 11) -> xr.Dataset:
     """
     import xarray as xr
 
-    of = Sections(run, link, n)
+    of = Sections(run, link, n, model)
     load = np.empty((of.times.size, of.n, 6))
     error = np.empty_like(load)
     for block, here, off in of.blocks():
@@ -157,12 +161,13 @@ def section_loads(run: RunLike, link: str, n: int = 11) -> xr.Dataset:
     )
 
 
-def section_split(run: RunLike, link: str, n: int = 11) -> xr.DataArray:
+@each_member
+def section_split(run: RunLike, link: str, n: int = 11, model: Model | None = None) -> xr.DataArray:
     """The load at sections of an elastic link by what the motion needs; the shares add up to it.
 
     Args:
         run: As for `section_loads`, with external_wrench where there are wrenches.
-        link, n: As for `section_loads`.
+        link, n, model: As for `section_loads`.
 
     Returns:
         DataArray (time, cause, section, component) [N, N m], axes and signs as `section_loads`.
@@ -175,7 +180,7 @@ def section_split(run: RunLike, link: str, n: int = 11) -> xr.DataArray:
     """
     import xarray as xr
 
-    of = Sections(run, link, n)
+    of = Sections(run, link, n, model)
     made = Split(run, "motion", of.model)
     found = np.empty((of.times.size, len(made.names), of.n, 6))
     for block in blocks(run, of.row_bytes * max(1, len(made.names))):
