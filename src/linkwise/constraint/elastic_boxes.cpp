@@ -15,7 +15,7 @@ ElasticBoxes::ElasticBoxes(const Model& model) : model_(model) {
     where_coordinates(model, SweepInput<double>{}, n, [&](const auto& body, const auto&) {
       place_[n] = static_cast<int>(boxes_.size());
       const int count = body.n_coordinates();
-      boxes_.push_back({.n = count});
+      boxes_.emplace_back().n = count;
       columns += count;
       numbers += count * (count + 1) + 4 * count;
     });
@@ -57,7 +57,7 @@ bool ElasticBoxes::update(const SweepInput<double>& in, int body,
     const Element& e = model_.elements[model_.topology[box.carried].first_element];
     ElasticPort<double> port;
     calc_elastic_port(*e.shape, in.q + e.q, port);
-    std::copy_n(port.P, n, box.P);
+    for (int k = 0; k < n; ++k) box.P[k] = port.P[k];
     X = states[box.carried].X;
     box.c = states[box.carried].c;
   }
