@@ -146,6 +146,16 @@ void bind_flexible(ModelClass& model, nb::class_<ModelBuilder>& builder) {
         return out;
       },
       "Length [m] of each elastic link, by its name; links in a row count each for itself.");
+  model.def_prop_ro(
+      "flexible_links",
+      [](const PyModel& self) {
+        nb::dict out;
+        for (const LinkSpec& link : self.model->spec().links)
+          if (link.body_kind != BodyKind::rigid)
+            out[link.name.c_str()] = body_kind_name(link.body_kind);
+        return out;
+      },
+      "Elastic links by name: \"beam\", or \"modal\" for a body of finite elements.");
   builder.def(
       "make_flexible", &make_flexible, "link"_a, nb::kw_only(), "section"_a = nb::none(),
       "E"_a = nb::none(), "G"_a = nb::none(), "density"_a = nb::none(), "damping"_a = 0.0,

@@ -122,22 +122,22 @@ nb::dict beam_properties(const PyModel& self) {
 }
 
 /// Angle between the start and the end of each elastic link, in the order of the links.
-nb::object beam_angles(const PyModel& self, nb::handle q) {
+nb::object elastic_angles(const PyModel& self, nb::handle q) {
   const Model& m = *self.model;
   const States s(m, q, nb::none(), nb::none(), "tau", nb::none());
-  std::vector<std::pair<const ElasticShape*, int>> beams;  // and where its coordinates are in q
+  std::vector<std::pair<const ElasticShape*, int>> bent;  // and where its coordinates are in q
   for (size_t l = 0; l < m.links.size(); ++l) {
-    if (m.spec().links[l].body_kind != BodyKind::beam) continue;
+    if (m.spec().links[l].body_kind == BodyKind::rigid) continue;
     const Element& e = m.elements[m.own_element[m.joints[m.links[l].joint].body]];
-    beams.emplace_back(e.shape, e.q);
+    bent.emplace_back(e.shape, e.q);
   }
-  NewArray out(s.lead, {beams.size()});
+  NewArray out(s.lead, {bent.size()});
   for (size_t i = 0; i < s.count; ++i)
-    for (size_t b = 0; b < beams.size(); ++b) {
-      const auto& [shape, first] = beams[b];
+    for (size_t b = 0; b < bent.size(); ++b) {
+      const auto& [shape, first] = bent[b];
       const Vec3<double> theta =
           elastic_port::theta(*shape, s.q.data + i * size(m.nq()) + size(first));
-      out.data[i * beams.size() + b] = std::sqrt(dot(theta, theta));
+      out.data[i * bent.size() + b] = std::sqrt(dot(theta, theta));
     }
   return out.array;
 }
@@ -145,7 +145,7 @@ nb::object beam_angles(const PyModel& self, nb::handle q) {
 }  // namespace
 
 void bind_sections(nb::module_& m) {
-  m.def("beam_angles", &beam_angles, "model"_a, "q"_a,
+  m.def("elastic_angles", &elastic_angles, "model"_a, "q"_a,
         R"(How far the end of each elastic link is turned against its start.
 
 Args:

@@ -86,6 +86,7 @@ RETURNS = {
     "Model.child_link_names": "list[str]",
     "Model.coupling_joints": "list[list[str]]",
     "Model.coupling_names": "list[str]",
+    "Model.flexible_links": "dict[str, str]",
     "Model.frame_placement": "tuple[str | None, Array, Array]",
     "Model.joint_labels": "tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str], ...]]",
     "Model.joint_axes": "list[list[tuple[str, tuple[float, float, float]]]]",

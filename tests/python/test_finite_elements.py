@@ -201,8 +201,8 @@ class TestMachines:
         assert np.abs(lw.inverse_dynamics(model, q, v, du) - tau).max() < 1e-12 * scale
         H = lw.mass_matrix(model, q)
         assert 0.5 * v @ H @ v == pytest.approx(lw.kinetic_energy(model, q, v), rel=1e-12)
-        states = np.array([q, 1.1 * q, 0.9 * q, q, 2 * q])
-        together = lw.forward_dynamics(model, states, np.tile(v, (5, 1)), np.tile(tau, (5, 1)))
+        states = np.outer(np.linspace(0.5, 1.5, 17), q)  # more than fit in lanes
+        together = lw.forward_dynamics(model, states, np.tile(v, (17, 1)), np.tile(tau, (17, 1)))
         alone = [lw.forward_dynamics(model, at, v, tau) for at in states]
         assert together == pytest.approx(np.array(alone), rel=1e-9, abs=1e-9 * np.abs(du).max())
 
@@ -211,6 +211,8 @@ class TestMachines:
         assert list(model.joint_names) == ["hub", "boom:1", "wrist"]
         run = lw.simulate(model, duration=0.001)
         assert "boom:1.mode8" in run.coordinate.values
+        with pytest.raises(lw.InputError, match="'boom' is of finite elements"):
+            lw.loads.section_loads(run, "boom", 5)
 
     def test_energy_is_the_sum_over_nodes(self):
         """Of the deformed body, node by node, without any integral."""
@@ -523,3 +525,27 @@ class TestFiles:
                 lw.run_scenario(scenario)
             assert message in str(error.value)
             assert "\n" not in str(error.value)
+
+
+def test_a_body_that_bends_too_far_is_said():
+    body = rod(modes=0)
+    model = arm(body, gravity=(0, 0, 0))
+    assert model.flexible_links == {"boom": "modal"}
+    for angle, said in ((0.1, 0), (0.3, 1)):
+        q0 = np.zeros(model.nq)
+        k = int(np.argmax(np.abs(body.outboard_turn[2])))
+        q0[1 + k] = angle / body.outboard_turn[2, k]
+        run = lw.simulate(model, duration=1e-5, q0=q0)
+        told = [w for w in run.warnings if "displacements, linear in its modes" in w["text"]]
+        assert [w["element"] for w in told] == ["boom"] * said
+
+
+def test_models_keep_their_bodies():
+    import pickle
+
+    model = arm(rod(modes=2))
+    again = pickle.loads(pickle.dumps(model))
+    q = 0.01 * np.arange(model.nq)
+    assert np.array_equal(
+        lw.forward_dynamics(model, q, q * 0), lw.forward_dynamics(again, q, q * 0)
+    )

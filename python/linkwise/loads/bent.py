@@ -38,6 +38,11 @@ def row_of(model: Model, link: object) -> list[str]:
     rows = beams_of(model)
     if not isinstance(link, str):
         raise InputError(f"link: is {shown(link)}; give the name of an elastic link")
+    if model.flexible_links.get(link) == "modal":
+        raise InputError(
+            f"link '{shorten(link)}' is of finite elements, which have no sections; take the loads "
+            "of its joints"
+        )
     if link not in rows:
         remedy = near(link, list(rows), "the elastic links are") if rows else "make it so"
         raise InputError(f"link '{shorten(link)}' is not elastic; {remedy}")

@@ -34,7 +34,7 @@ def _body(
     source: ScenarioSource, link: FlexibleSection, file: str, keys: tuple[str, str]
 ) -> FlexibleBody:
     """The body of the file, with another damping where that is given."""
-    for key in link.model_fields_set - {"file", _DAMPING}:
+    for key in sorted(link.model_fields_set - {"file", _DAMPING}):
         source.complain(keys, f"{key} is given beside file, which has it", "leave it out")
     try:
         body = FlexibleBody.load(source.resolve(file))

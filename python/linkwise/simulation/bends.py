@@ -30,7 +30,8 @@ class Bends:
 
     def __init__(self, model: Model) -> None:
         self._model = model
-        self._links = list(model.beam_lengths)
+        self._kinds = model.flexible_links
+        self._links = list(self._kinds)
         self._most = np.zeros(len(self._links))
         self._when = np.zeros(len(self._links))
 
@@ -48,7 +49,7 @@ class Bends:
         whole = np.isfinite(positions).all(axis=-1)
         if self.none or not whole.any():
             return
-        angles = _core.beam_angles(self._model, positions[whole])
+        angles = _core.elastic_angles(self._model, positions[whole])
         at = angles.argmax(axis=0)
         most = angles[at, np.arange(len(self._links))]
         self._when = np.where(most > self._most, times[whole][at], self._when)
@@ -65,13 +66,18 @@ class Bends:
             if link not in worst or self._most[k] > self._most[worst[link]]:
                 worst[link] = k
         return [
-            Ignored("", link, self._text(count[link], float(self._most[k]), float(self._when[k])))
+            Ignored("", link, self._text(link, count[link], self._most[k], self._when[k]))
             for link, k in worst.items()
             if self._most[k] > FOLLOWED
         ]
 
-    @staticmethod
-    def _text(count: int, angle: float, time: float) -> str:
+    def _text(self, link: str, count: int, angle: float, time: float) -> str:
+        if self._kinds[link] == "modal":
+            return (
+                f"it turns by {angle:.2g} rad from its inboard to its outboard handle, at "
+                f"{time:.4g} s, and its displacements, linear in its modes, are off by up to "
+                f"{100 * _ERROR * angle**2:.2g} % there: make the part of several links"
+            )
         # Under its weight a beam bends three times as much at its start as on average.
         most = count * angle * (3 if count == 1 else 1)
         needed = max(count + 1, math.ceil(most / (0.8 * FOLLOWED)))
