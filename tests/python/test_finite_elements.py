@@ -206,6 +206,19 @@ class TestMachines:
         alone = [lw.forward_dynamics(model, at, v, tau) for at in states]
         assert together == pytest.approx(np.array(alone), rel=1e-9, abs=1e-9 * np.abs(du).max())
 
+    @pytest.mark.parametrize("solver", ["thomas", "conjugate_gradient"])
+    def test_constraint_forces_are_the_loads_of_the_recursion(self, solver):
+        model, q, v, rng = self.drawn(rod(modes=4))
+        tau = rng.normal(size=model.nv)
+        given = {"method": "constraint_force", "solver": solver}
+        du = lw.forward_dynamics(model, q, v, tau)
+        found = lw.forward_dynamics(model, q, v, tau, **given)
+        assert found == pytest.approx(du, abs=1e-8 * np.abs(du).max())
+        load = lw.joint_loads(model, q, v, tau)
+        assert lw.joint_loads(model, q, v, tau, **given) == pytest.approx(
+            load, abs=1e-8 * np.abs(load).max()
+        )
+
     def test_coordinates_have_names_and_units(self):
         model = arm(rod(modes=2))
         assert list(model.joint_names) == ["hub", "boom:1", "wrist"]
@@ -357,9 +370,9 @@ class TestMachines:
             (lambda: model.with_link("boom", mass=3.0), "whose finite elements say"),
             (
                 lambda: lw.forward_dynamics(
-                    model, np.zeros(model.nq), np.zeros(model.nv), method="constraint_force"
+                    model, np.zeros(model.nq), np.zeros(model.nv), method="composite_rigid_body"
                 ),
-                "is of kind modal, which method constraint_force does not take",
+                "is of kind modal, which method composite_rigid_body does not take",
             ),
         ):
             with pytest.raises(lw.InputError) as error:
