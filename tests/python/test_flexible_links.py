@@ -420,8 +420,8 @@ class TestRefusals:
                 "closes a loop, and a body with coordinates of its own takes none",
             ),
             (
-                lambda: lw.forward_dynamics(model, q, q, method="constraint_force"),
-                "is of kind beam, which method constraint_force does not take",
+                lambda: lw.forward_dynamics(model, q, q, method="composite_rigid_body"),
+                "is of kind beam, which method composite_rigid_body does not take",
             ),
             (
                 lambda: lw.simulate(model, duration=0.1, drives={"boom:1": lw.Torque(1.0)}),
