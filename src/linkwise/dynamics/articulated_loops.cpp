@@ -72,6 +72,8 @@ ArticulatedLoops::ArticulatedLoops(const Model& model)
     Work& w = work_[g];
     w.columns.resize(groups_[g].columns);
     w.Psi.resize(rows);
+    w.own_z.resize(groups_[g].own);
+    w.own_y.resize(groups_[g].own);
     systems_.emplace_back(groups_[g]);
     for (auto* x : {&w.beta, &w.r, &w.size, &w.f, &w.rhs}) x->resize(rows);
   }
@@ -198,6 +200,8 @@ void ArticulatedLoops::find_independent() {
   if (!model_.couplings.empty() || groups_.empty()) return;
   for (const LoopSystem& system : systems_)
     if (system.width() > most_width) return;
+  for (const LoopGroup& group : groups_)
+    if (group.own > 0) return;
   constexpr int samples = 4;
   const std::vector<double> start = model_.initial_configuration(), rest(model_.nv());
   std::vector<double> q, du(model_.nv());
@@ -254,6 +258,7 @@ void ArticulatedLoops::place_forces(const SweepInput<double>& in, int g) {
     std::fill_n(column.z, 6, 0.0);
   }
   std::fill(w.Psi.begin(), w.Psi.end(), Force<double>{});
+  std::fill(w.own_z.begin(), w.own_z.end(), 0.0);
   for (const auto& member : groups_[g].members) {
     if (member.coupling >= 0) {
       place_coupling(in, g, member);
@@ -324,7 +329,9 @@ void ArticulatedLoops::carry(const SweepInput<double>& in, int g) {
   for (const auto& carrier : group.carriers) {
     const int count = static_cast<int>(carrier.rows.size());
     const std::span columns(w.columns.data() + carrier.first, static_cast<size_t>(count));
+    if (carrier.own > 0) carry_own(g, carrier);
     const int dof = sweeps_.carry_loops(in, carrier.body, columns);
+    if (carrier.elastic >= 0) push_own(g, carrier);
     w.y.resize(static_cast<size_t>(dof) * count);
     for (int k = 0; k < dof; ++k)
       for (int j = 0; j < count; ++j) w.y[k * count + j] = columns[j].y[k];
@@ -350,6 +357,36 @@ void ArticulatedLoops::carry(const SweepInput<double>& in, int g) {
   for (const auto& member : group.members)
     for (int i = member.row; member.loop >= 0 && i < member.row + member.n_rows; ++i)
       system.row(i)[i] += states_[member.loop].yields[i - member.row];
+}
+
+/// Coordinates of a carrier's own yield before its joint does.
+void ArticulatedLoops::carry_own(int g, const LoopGroup::Carrier& carrier) {
+  Work& w = work_[g];
+  const std::span columns(w.columns.data() + carrier.first, carrier.rows.size());
+  const double* const z = w.own_z.data() + carrier.own_first;
+  double* const y = w.own_y.data() + carrier.own_first;
+  std::vector<double>& beta = w.rhs;
+  sweeps_.carry_loops_own(carrier.body, columns, z, y, beta.data());
+  for (size_t i = 0; i < carrier.rows.size(); ++i) {
+    double* const row = systems_[g].row(carrier.rows[i]);
+    for (size_t j = 0; j <= i; ++j) {
+      double sum = 0;
+      for (int k = 0; k < carrier.own; ++k) sum += z[i * carrier.own + k] * y[j * carrier.own + k];
+      row[carrier.rows[j]] += sum;
+    }
+    w.beta[carrier.rows[i]] += beta[i];
+    w.size[carrier.rows[i]] += std::abs(beta[i]);
+  }
+}
+
+/// What a carrier on a port transmits along its parent's coordinates.
+void ArticulatedLoops::push_own(int g, const LoopGroup::Carrier& carrier) {
+  Work& w = work_[g];
+  const LoopGroup::Carrier& parent = groups_[g].carriers[carrier.elastic];
+  double* const z = w.own_z.data() + parent.own_first;
+  for (size_t i = 0; i < carrier.rows.size(); ++i)
+    sweeps_.push_own(carrier.body, w.columns[carrier.first + i].F,
+                     z + static_cast<size_t>(carrier.to[i] - parent.first) * parent.own);
 }
 
 /// D, and the factor of Lambda in coordinates in which D is 1.
@@ -415,6 +452,8 @@ void ArticulatedLoops::solve_forces(const SweepInput<double>& in, int g, bool wi
     sweeps_.apply_loops(
         carrier.body, std::span<const LoopColumn<double>>(w.columns.data() + carrier.first, count),
         own.data(), with_loads);
+    if (carrier.own > 0)
+      sweeps_.apply_loops_own(carrier.body, w.own_z.data() + carrier.own_first, own.data(), count);
   }
 }
 

@@ -67,6 +67,7 @@ class ArticulatedLoops {
     std::vector<Force<double>> Psi;             ///< [rows] on the top
     std::vector<double> beta, r, size, f, rhs;  ///< [rows]; size: of what makes up beta and r
     std::vector<double> y;                      ///< [columns of the joint][rows] of a carrier
+    std::vector<double> own_z, own_y;           ///< [rows][own] of each carrier
   };
 
   /// Of an evaluation by independent rows. none: it takes all.
@@ -79,6 +80,8 @@ class ArticulatedLoops {
   void find_independent();
   void take_rows(int g, std::vector<char>& taken) const;
   void carry(const SweepInput<double>& in, int g);
+  void carry_own(int g, const LoopGroup::Carrier& carrier);
+  void push_own(int g, const LoopGroup::Carrier& carrier);
   void place_forces(const SweepInput<double>& in, int g);
   void place_coupling(const SweepInput<double>& in, int g, const LoopGroup::Member& member);
   double yielding_of(const SweepInput<double>& in, const LoopGroup::Member& member) const;

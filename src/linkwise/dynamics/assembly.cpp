@@ -90,11 +90,12 @@ class Closing {
     return false;
   }
 
-  /// Moves all joints that are free a little, in directions that are the same in every run.
+  /// Moves all joints that are free a little, in directions that are the same in every run. Elastic
+  /// bodies keep their shape.
   void leave_dead_end(std::uint32_t& seed, double times, std::vector<double>& q) {
     std::fill(step_.begin(), step_.end(), 0.0);
     for (const Element& e : model_.elements)
-      for (int i = 0; i < e.nv && !e.prescribed; ++i) {
+      for (int i = 0; i < e.nv && !e.prescribed && !is_of_body(e); ++i) {
         seed = 1664525u * seed + 1013904223u;
         step_[e.v + i] = times * kick * (static_cast<double>(seed) / 2147483648.0 - 1);
       }

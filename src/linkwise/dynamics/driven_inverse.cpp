@@ -32,7 +32,8 @@ DrivenInverse::DrivenInverse(const Model& model, std::span<const std::string> dr
   if (dofs_.empty()) {
     std::string names;
     for (const JointInfo& joint : model.joints)
-      if (joint.nv > 0) names += (names.empty() ? "'" : ", '") + joint.name + "'";
+      if (joint.nv > 0 && joint.type != JointType::elastic)
+        names += (names.empty() ? "'" : ", '") + joint.name + "'";
     throw InputError(
         "model '" + model.spec().name + "'" + model.where() +
         " has closed loops or couplings, so torques of a motion depend on which joints "
@@ -57,6 +58,9 @@ void DrivenInverse::add_driven(const std::string& name) {
   const int load = model_.load_index(name);
   const JointInfo& joint = model_.joint_at(load);
   const bool closes = load >= model_.n_joints();
+  if (joint.type == JointType::elastic)
+    throw InputError("driven: joint '" + name +
+                     "' is elastic, and its coordinates have no drive; drive another joint");
   if (joint.nv == 0) throw InputError("driven: joint '" + name + "' has no freedom; leave it out");
   for (int i = joint.v; i < joint.v + joint.nv; ++i) {
     if (std::find(dofs_.begin(), dofs_.end(), Dof{i, closes}) != dofs_.end())

@@ -475,10 +475,12 @@ void Evaluator::mass_matrix(size_t count, const double* q, const Executor& execu
   const Model& m = *model_;
   const size_t nv = m.nv();
   if (!m.own_element.empty()) {
-    refuse_loops(m, "the mass matrix of a machine with elastic links");
     return for_each_part(m, count, executor, go_on, [&](size_t first, size_t n) {
-      for (size_t i = first; i < first + n; ++i)
+      LoopRates loops(m);
+      for (size_t i = first; i < first + n; ++i) {
         mass_matrix_by_columns(m, q + i * m.nq(), H + i * nv * nv);
+        loops.add_rotors_to(q + i * m.nq(), H + i * nv * nv);
+      }
     });
   }
   require_known_bodies(m, find_dynamics("composite_rigid_body"));

@@ -49,6 +49,13 @@ std::vector<int> ends_of(const Model& model, const LoopGroup::Member& member) {
   return ends;
 }
 
+/// Coordinates of a body's own that carry a port.
+int count_own(const Model& model, int body) {
+  if (model.own_element.empty() || model.own_element[body] < 0) return 0;
+  const Element& first = model.elements[model.own_element[body]];
+  return first.kind == ElementKind::elastic ? first.nv : 0;
+}
+
 /// The innermost body that a member's paths start from. A coupling acts within joints of the tree,
 /// so its paths start inboard of them.
 int top_of(const Model& model, const LoopGroup::Member& member) {
@@ -66,6 +73,8 @@ int top_of(const Model& model, const LoopGroup::Member& member) {
       int& outer = top > other ? top : other;
       outer = model.topology[outer].parent;
     }
+  // Forces on a port act along the coordinates that carry it, too: they pass such a body.
+  while (top >= 0 && count_own(model, top) > 0) top = model.topology[top].parent;
   return top;
 }
 
@@ -101,6 +110,16 @@ void add_carriers(const Model& model, LoopGroup& group) {
     group.carriers.push_back({body, own, group.columns, {}});
     group.columns += static_cast<int>(own.size());
     known[body] = &group.carriers.back();
+  }
+  for (size_t i = 0; i < group.carriers.size(); ++i) {
+    LoopGroup::Carrier& at = group.carriers[i];
+    at.own = count_own(model, at.body);
+    at.own_first = group.own;
+    group.own += at.own * static_cast<int>(at.rows.size());
+    if (on_port(model, model.topology[at.body]))
+      for (size_t k = i + 1; at.elastic < 0; ++k)
+        if (group.carriers[k].body == model.topology[at.body].parent)
+          at.elastic = static_cast<int>(k);
   }
   const auto column_of = [&](int body, int row) {
     if (body == group.top) return -1 - row;

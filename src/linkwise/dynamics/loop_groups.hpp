@@ -15,6 +15,10 @@ struct LoopGroup {
     std::vector<int> rows;
     int first;
     std::vector<int> to;  ///< column at the parent that each adds to, or -1 - row: at the top
+    /// Of a body whose own coordinates carry a port: how many, and the first of their parts of unit
+    /// forces, [rows][own], among those of all carriers.
+    int own = 0, own_first = 0;
+    int elastic = -1;  ///< of a body on a port: the carrier that is its parent
   };
   /// A loop joint or a coupling: its rows [row, row + n_rows), and the columns, or -1 - row, where
   /// its forces act. Those of a joint are on its parent and its child, those of a coupling on the
@@ -27,6 +31,7 @@ struct LoopGroup {
 
   int top = -1;
   int rows = 0, columns = 0;
+  int own = 0;     ///< parts of unit forces along coordinates of bodies' own
   int rotors = 0;  ///< how many of the rows are those of rotors, which hold nothing
   std::vector<Member> members;
   std::vector<Carrier> carriers;  ///< tip to base

@@ -22,7 +22,7 @@ constexpr double faint = 1e-3, weak = 1e-5, null = 1e-12, drift = 1e-11;
 }  // namespace
 
 void move_by(const Model& model, const double* du, double* q) {
-  double rate[7];
+  double rate[std::max(7, most_coordinates)];
   for (const Element& e : model.elements) {
     Element own = e;  // rates alone, at the front of a small array
     own.q = 0;
@@ -72,8 +72,9 @@ void LoopProjection::find_rank(const double* q, const double* v) {
   for (int way = 0; way < (fastest > 0 ? 4 : 2); ++way) {
     const double beside = way % 2 == 0 ? 0.03 : -0.03;  // rad, or m
     other.assign(q, q + model_.nq());
+    // Not coordinates of elastic bodies: they are small, and no rank depends on them.
     for (const Element& e : model_.elements)
-      for (int i = e.v; i < e.v + e.nv && !e.prescribed; ++i)
+      for (int i = e.v; i < e.v + e.nv && !e.prescribed && !is_of_body(e); ++i)
         aside[i] = beside * (way < 2 ? std::cos(2.4 * i) : v[i] / fastest);
     move_by(model_, aside.data(), other.data());
     for (int k = 0; k < 20 && gap(other.data()) > closed; ++k) {

@@ -126,6 +126,11 @@ LW_INLINE Transform<S> element_pose(const Element& e, const S* q) {
   return PrismaticJoint::pose(e.placement, 0.0, S{});
 }
 
+/// Are its coordinates a body's own, and no motion of a joint?
+inline bool is_of_body(const Element& e) {
+  return e.kind == ElementKind::own || e.kind == ElementKind::elastic;
+}
+
 /// Column k of the motion subspace in the element's own frame, for all kinds but the elastic one,
 /// whose columns depend on its coordinates.
 template <class S>

@@ -23,12 +23,16 @@ std::vector<KindRange> carriers_of_loops(const Model& model) {
 
 double size(const Vec3<double>& r) { return std::sqrt(dot(r, r)); }
 
+double length_of(const Element& e) {
+  return size(e.placement.r) + (e.kind == ElementKind::elastic ? size(e.shape->rest) : 0);
+}
+
 double length_of(const Model& model, const LoopJoint& loop, const LoopPath& path) {
   double length = size(loop.on_parent.r) + size(loop.on_child.r);
   for (const auto* bodies : {&path.to_a, &path.to_b})
     for (const int n : *bodies)
       for (int i = 0; i < model.topology[n].n_elements; ++i)
-        length += size(model.elements[model.topology[n].first_element + i].placement.r);
+        length += length_of(model.elements[model.topology[n].first_element + i]);
   return length > 0 ? length : 1;
 }
 
@@ -48,10 +52,10 @@ LoopStates::Moving moving_stack(const Model& model, const BodyTopology& body,
     const Transform<double> X = element_pose(e, in.q);
     own.X = i == 0 ? X : X * own.X;
     own.v = X * own.v;
-    for (int k = 0; k < e.nv && in.v; ++k) {
-      const Motion<double> column = element_column<double>(e, k);
+    if (!in.v) continue;
+    for_columns(e, in.q, [&](int k, const Motion<double>& column) {
       own.v += Motion<double>{in.v[e.v + k] * column.lin, in.v[e.v + k] * column.ang};
-    }
+    });
   }
   return own;
 }

@@ -15,7 +15,13 @@ namespace {
 
 double length_of(const Vec3<double>& a) { return std::sqrt(dot(a, a)); }
 
-/// The joints that the link carries are all at this point, if there are any.
+/// Is a point of a link where its elastic body starts?
+bool is_start(const Vec3<double>& point, double length) {
+  return length_of(point) <= 1e-9 * (1 + length);
+}
+
+/// The joints that the link carries are all at this point, if there are any, but for those that
+/// close loops at its start.
 std::optional<Vec3<double>> carried_at(const ModelSpec& spec, const std::string& link,
                                        const std::string& head) {
   const JointSpec* first = nullptr;
@@ -28,12 +34,22 @@ std::optional<Vec3<double>> carried_at(const ModelSpec& spec, const std::string&
                        "' are at different points of it; let all joints be at its end, and rigid "
                        "links carry what is elsewhere");
   }
-  if (first) return first->translation;
-  for (const LoopJointSpec& loop : spec.loop_joints) {
-    if (loop.joint.parent == link) return loop.joint.translation;
-    if (loop.joint.child == link) return loop.child_translation;
-  }
-  return {};
+  const std::string* name = first ? &first->name : nullptr;
+  Vec3<double> end = first ? first->translation : Vec3<double>{};
+  for (const LoopJointSpec& loop : spec.loop_joints)
+    for (const bool parent : {true, false}) {
+      if ((parent ? loop.joint.parent : loop.joint.child) != link) continue;
+      const Vec3<double>& point = parent ? loop.joint.translation : loop.child_translation;
+      if (is_start(point, length_of(end))) continue;
+      if (!name) end = point;
+      if (length_of(point - end) > 1e-9 * (1 + length_of(point)))
+        throw InputError(head + "joints '" + *name + "' and '" + loop.joint.name +
+                         "' are at different points of it; let all joints be at its end or its "
+                         "start, and rigid links carry what is elsewhere");
+      name = &loop.joint.name;
+    }
+  if (!name) return {};
+  return end;
 }
 
 Vec3<double> end_of(const ModelSpec& spec, const FlexibleLink& flexible, const std::string& head) {
@@ -98,7 +114,8 @@ void set_straight(LinkSpec& link, const BeamProperties& of, const Mat3<double>& 
   link.parameters.assign(first, first + Beam::n_parameters);
 }
 
-/// What hung on the link hangs on `end`, whose frame is that of the beam, moved there.
+/// What hung on the link hangs on `end`, whose frame is that of the beam, moved there. Joints that
+/// close loops at its start stay on the link.
 void move_to_end(ModelSpec& spec, const std::string& link, const std::string& end,
                  const Mat3<double>& axes, const Vec3<double>& at) {
   const auto move = [&](std::string& name, Mat3<double>& rotation, Vec3<double>& translation) {
@@ -110,8 +127,10 @@ void move_to_end(ModelSpec& spec, const std::string& link, const std::string& en
   };
   for (JointSpec& joint : spec.joints) move(joint.parent, joint.rotation, joint.translation);
   for (LoopJointSpec& loop : spec.loop_joints) {
-    move(loop.joint.parent, loop.joint.rotation, loop.joint.translation);
-    move(loop.joint.child, loop.child_rotation, loop.child_translation);
+    if (!is_start(loop.joint.translation, length_of(at)))
+      move(loop.joint.parent, loop.joint.rotation, loop.joint.translation);
+    if (!is_start(loop.child_translation, length_of(at)))
+      move(loop.joint.child, loop.child_rotation, loop.child_translation);
   }
 }
 

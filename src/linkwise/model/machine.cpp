@@ -146,8 +146,8 @@ Machine make_machine(const ModelSpec& spec, const NameIndex& links, const std::s
     // Only rigid bodies become one by a weld.
     const auto rigid = [&](int l) { return spec.links[l].body_kind == BodyKind::rigid; };
     const bool weld = !closes && j.type == JointType::fixed && rigid(parent) && rigid(child);
-    graph.joints.push_back(
-        {parent, child, dof, acts(j), weld, closes, j.type == JointType::composite});
+    graph.joints.push_back({parent, child, dof, acts(j), weld, closes,
+                            j.type == JointType::composite || j.type == JointType::elastic});
     // The body behind an elastic joint moves with mass, that of the elastic body.
     if (j.type == JointType::elastic) graph.massless[child] = 0;
   }
@@ -183,6 +183,11 @@ void check_forest(const Machine& machine, const SpanningForest& forest, const Lu
       throw InputError("joint '" + machine.joint(j).name + "'" + machine.where + " joins links '" +
                        machine.link_name(parent) + "' and '" + machine.link_name(child) +
                        "', which fixed joints make one body; remove the joint");
+    if (machine.joint(j).type == JointType::elastic)
+      throw InputError("joint '" + machine.joint(j).name + "'" + machine.where +
+                       " is elastic and cannot close a loop; let the other joint that leads to "
+                       "link '" +
+                       machine.link_name(child) + "' lead from it instead");
     if (machine.joint(j).type == JointType::composite)
       throw InputError("joint '" + machine.joint(j).name + "'" + machine.where +
                        " is composite and closes a loop of joints " +

@@ -25,6 +25,9 @@ Coupling::Term place_term(const Model& model, const CouplingSpec::Term& given,
     throw InputError(head + error.what());
   }
   const JointInfo& joint = model.joint_at(j);
+  if (joint.type == JointType::elastic)
+    throw InputError(head + "joint '" + joint.name +
+                     "' is elastic, and its coordinates are not coupled; couple other joints");
   if (joint.nv != 1)
     throw InputError(head + "joint '" + joint.name + "' is " + type_of(model, j) + " and has " +
                      std::to_string(joint.nv) + " degrees of freedom; couple joints that have one");

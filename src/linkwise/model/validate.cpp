@@ -149,10 +149,14 @@ void validate_ports(ModelSpec& spec, const std::string& where) {
                        ": is elastic, and no elastic joint is on it; add one, to the link at its "
                        "end");
   for (const LoopJointSpec& loop : spec.loop_joints)
-    for (const std::string& name : {loop.joint.parent, loop.joint.child})
-      if (coordinates.count(name))
+    for (const bool parent : {true, false}) {
+      const std::string& name = parent ? loop.joint.parent : loop.joint.child;
+      const Vec3<double>& at = parent ? loop.joint.translation : loop.child_translation;
+      if (coordinates.count(name) && !(dot(at, at) <= 1e-18))
         throw InputError("joint '" + loop.joint.name + "'" + where + ": link '" + name +
-                         "' is elastic; let the joint be on the link at its end");
+                         "' is elastic; let the joint be where it starts, or on the link at its "
+                         "end");
+    }
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 // A row that reads F^T a of the bodies that it acts on thereby becomes
 //     F^T a_n = Fbar^T X a_p + beta + Lambda f,   Lambda = z^T y,   beta = y^T h + Fbar^T c
 // These are the columns of cut forces in steps.hpp, for any joint and number of rows.
+#include "linkwise/recursion/own_steps.hpp"
 #include "linkwise/recursion/stack_steps.hpp"
 
 namespace linkwise {
@@ -67,6 +68,21 @@ int carry(const EliminatedFree<S>& free, LoopColumn<T>& column) {
   column.beta = dot(free.a, column.F);
   column.F = {};
   return 6;
+}
+
+/// Coordinates of a body's own yield to the part z of a unit force that is along them, [n], before
+/// the body's joint does: y = m_e^-1 z, and the frame feels F - M_e y. Returns what that adds to
+/// beta.
+template <class S>
+LW_INLINE S carry_own(int n, const OwnEquations<S>& of, const S* h, const S* z, S* y, Force<S>& F) {
+  for (int k = 0; k < n; ++k) y[k] = z[k];
+  cholesky_solve(n, of.m_e, y);
+  S beta{};
+  for (int k = 0; k < n; ++k) {
+    F -= y[k] * of.M_e[k];
+    beta += y[k] * h[k];
+  }
+  return beta;
 }
 
 /// The joint under forces of which z and y add up to these, by the columns of the joint.

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "linkwise/kinematics/body_state.hpp"
-#include "linkwise/recursion/own_steps.hpp"
+#include "linkwise/recursion/loop_steps.hpp"
 
 namespace linkwise {
 
@@ -109,6 +109,22 @@ class OwnBodies {
   void accelerate(int n, const Motion<S>& a, S* du) const {
     const Body& b = at(n);
     accelerate_own(b.n, b.blocks, b.h, a, du + own_place(model_, n));
+  }
+
+  // Of loops, once a body is eliminated (loop_steps.hpp):
+
+  /// A force on body n, on a port, along its parent's coordinates: adds to z.
+  void push(int n, const Force<S>& F, S* z) const {
+    const Body& b = at(model_.topology[n].parent);
+    for (int k = 0; k < b.n; ++k) z[k] += dot(b.port.P[k], F);
+  }
+  S carry(int n, const S* z, S* y, Force<S>& F) const {
+    return carry_own(at(n).n, at(n).blocks, at(n).h, z, y, F);
+  }
+  /// Forces along the coordinates of body n that are now known.
+  void apply(int n, const S& f, const S* z) {
+    Body& b = at(n);
+    for (int k = 0; k < b.n; ++k) b.h[k] += f * z[k];
   }
 
  private:

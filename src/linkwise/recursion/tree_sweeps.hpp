@@ -254,6 +254,21 @@ class TreeSweeps {
     return count;
   }
 
+  /// The same across the coordinates of body n's own, before its joint: z, y
+  /// [columns][coordinates], beta [columns] of each column.
+  void carry_loops_own(int n, std::span<LoopColumn<S>> columns, const S* z, S* y, S* beta) const {
+    const int count = own_.count(n);
+    for (size_t i = 0; i < columns.size(); ++i)
+      beta[i] = own_.carry(n, z + i * count, y + i * count, columns[i].F);
+  }
+  /// What body n, on a port, transmits along its parent's coordinates: adds to z.
+  void push_own(int n, const Force<S>& F, S* z) const { own_.push(n, F, z); }
+  /// Forces f of columns, now known, along the coordinates of body n's own.
+  void apply_loops_own(int n, const S* z, const S* f, size_t columns) {
+    const int count = own_.count(n);
+    for (size_t i = 0; i < columns; ++i) own_.apply(n, f[i], z + i * count);
+  }
+
   /// How many columns body n's joint has.
   int n_columns(int n) const {
     const BodyTopology& at = model_.topology[n];

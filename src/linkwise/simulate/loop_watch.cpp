@@ -119,11 +119,15 @@ void LoopWatch::pass_on(const std::vector<int>& path, Force<double> F, double of
                         double of_shifts, std::vector<Along>& out) const {
   for (size_t i = path.size(); i-- > 0;) {
     const int n = path[i];
-    for (int k = columns_.first(n); k < columns_.first(n + 1); ++k) {
-      const Motion<double>& P = columns_.P(k);
-      out.push_back({columns_.dof(k), dot(P, F),
-                     length(P.ang) * length(F.ang) + length(P.lin) * length(F.lin),
+    const auto add = [&](int dof, const Motion<double>& P) {
+      out.push_back({dof, dot(P, F), length(P.ang) * length(F.ang) + length(P.lin) * length(F.lin),
                      of_turns * length(P.ang) + of_shifts * length(P.lin)});
+    };
+    for (int k = columns_.first(n); k < columns_.first(n + 1); ++k)
+      add(columns_.dof(k), columns_.P(k));
+    if (on_port(tree_, tree_.topology[n])) {
+      const Element& e = tree_.elements[tree_.topology[n].first_element];
+      for_columns(e, state_.data(), [&](int k, const Motion<double>& P) { add(e.v + k, P); });
     }
     F = transpose_times(columns_.state(n).X, F);
   }
