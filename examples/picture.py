@@ -90,7 +90,7 @@ def lines(model, poses, tips):
             if joint in seen:
                 break
             seen.add(joint)
-            if model.joint_types[joint] == "elastic":
+            if model.joint_names[joint].rpartition(":")[0] in model.beam_lengths:
                 yield np.array(points)
                 points = []
             joint = parents[joint]

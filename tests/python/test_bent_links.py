@@ -292,7 +292,10 @@ def test_general_sections_have_stresses_where_their_sizes_are_given():
 
 def test_bad_input_is_one_line(run):
     for call, message in (
-        (lambda: lw.loads.section_summary(run, "tower"), "link 'tower' is not elastic; the"),
+        (
+            lambda: lw.loads.section_summary(run, "tower"),
+            "link 'tower' is not an elastic beam; the",
+        ),
         (lambda: lw.loads.section_deflections(run, "jib", True), "n: is True; give a number"),
         (lambda: lw.loads.section_split(run, "jip"), "did you mean 'jib'"),
         (lambda: lw.loads.section_damage(run, "jib", 1), "n: is 1; give a number of sections"),

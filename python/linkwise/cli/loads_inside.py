@@ -118,9 +118,7 @@ def _peaks(summary: xr.Dataset) -> list[dict[str, Any]]:
     ]
 
 
-def _add_causes(
-    run: Run, model: Model, link: str, n: int, records: list[dict[str, Any]]
-) -> None:
+def _add_causes(run: Run, model: Model, link: str, n: int, records: list[dict[str, Any]]) -> None:
     """What each cause adds to the peaks of components."""
     import numpy as np
 

@@ -44,8 +44,8 @@ def row_of(model: Model, link: object) -> list[str]:
             "of its joints"
         )
     if link not in rows:
-        remedy = near(link, list(rows), "the elastic links are") if rows else "make it so"
-        raise InputError(f"link '{shorten(link)}' is not elastic; {remedy}")
+        remedy = near(link, list(rows), "the elastic beams are") if rows else "make it one"
+        raise InputError(f"link '{shorten(link)}' is not an elastic beam; {remedy}")
     return rows[link]
 
 

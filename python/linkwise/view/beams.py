@@ -26,7 +26,7 @@ ALL_PIECES = 3000
 
 class Beams:
     """The pieces of all elastic links of a machine: `sizes` (n, 2) [m] of their sections along y
-    and z, and which are `round` (n,)."""
+    and z, which are `round` (n,), and the names of the `joints` that carry their ends."""
 
     def __init__(self, model: Model) -> None:
         self._model = model
@@ -47,6 +47,7 @@ class Beams:
             sizes += [_outside(of)] * pieces
             is_round += [bool(of["round"])] * pieces
         index = {name: k for k, name in enumerate(model.link_names)}
+        self.joints = {f"{name}:{k + 1}" for name, row in rows.items() for k in range(len(row))}
         self._names, self._places = names, places
         self._links: npt.NDArray[np.int64] = np.array([index[n] for n in names], dtype=np.int64)
         self._starts: npt.NDArray[np.int64] = np.array(starts, dtype=np.int64)

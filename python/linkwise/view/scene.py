@@ -244,7 +244,8 @@ class Scene:
                 self.layers[toggle].append(Layer(handle, Following(chosen, offsets[chosen])))
         outboard = np.flatnonzero(inboard >= 0)
         thick = self._thickness()
-        stiff = outboard[[model.joint_types[k] != "elastic" for k in outboard]]
+        bent = self.beams.joints
+        stiff = outboard[[model.joint_names[k] not in bent for k in outboard]]
         spans = np.concatenate([np.column_stack([inboard[stiff], stiff]), self.places.spans])
         if len(spans):
             handle = self._add(

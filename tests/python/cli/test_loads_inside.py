@@ -122,7 +122,10 @@ def test_loads_name_the_flexible_links(linkwise, run):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--sections", "tower"], "link 'tower' is not elastic; the elastic links are: jib"),
+        (
+            ["--sections", "tower"],
+            "link 'tower' is not an elastic beam; the elastic beams are: jib",
+        ),
         (["--sections", "jip"], "did you mean 'jib'"),
         (["--sections", "jib", "-n", "1"], "n: is 1; give a number of sections from 2"),
         (["-n", "5"], "-n: goes with --sections"),
