@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise import _core
+from linkwise._core import InputError
 from linkwise.base import COMPONENTS, Array
 from linkwise.loads.bent import beams_of, check_count, row_of, spread
 from linkwise.loads.causes import CAUSES, Split
@@ -176,11 +177,16 @@ def section_split(run: RunLike, link: str, n: int = 11, model: Model | None = No
         them, and what balances the wrenches from outside.
 
     Raises:
-        InputError: as `section_loads`.
+        InputError: as `section_loads`, or the machine has closed loops.
     """
     import xarray as xr
 
     of = Sections(run, link, n, model)
+    if of.model.n_loops or of.model.coupling_names:
+        raise InputError(
+            "run: its machine has closed loops, where the loads inside links do not split by "
+            "cause yet; ask for section_loads"
+        )
     made = Split(run, "motion", of.model)
     found = np.empty((of.times.size, len(made.names), of.n, 6))
     for block in blocks(run, of.row_bytes * max(1, len(made.names))):
