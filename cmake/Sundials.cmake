@@ -87,6 +87,11 @@ function(linkwise_add_sundials provider)
       break()
     endif()
   endforeach()
+  # Its functions got the names that esdirk.cpp uses in SUNDIALS 7.1.
+  if(TARGET SUNDIALS::arkode AND SUNDIALS_VERSION VERSION_GREATER_EQUAL 7.1)
+    target_link_libraries(linkwise_sundials INTERFACE SUNDIALS::arkode)
+    target_compile_definitions(linkwise_sundials INTERFACE LINKWISE_SUNDIALS_ARKODE=1)
+  endif()
   foreach(component IN ITEMS nvecserial sunlinsoldense sunlinsolspgmr sunmatrixdense
                              sunnonlinsolfixedpoint sunnonlinsolnewton)
     target_link_libraries(linkwise_sundials INTERFACE SUNDIALS::${component})

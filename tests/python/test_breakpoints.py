@@ -11,7 +11,7 @@ import linkwise as lw
 
 INERTIA, TORQUE = 10 / 1.31, 10.0
 RAMP = 1e-6
-VARIABLE = ("auto", "adams", "bdf")
+VARIABLE = ("auto", "adams", "bdf", "esdirk")
 
 
 @pytest.fixture(scope="module")

@@ -43,7 +43,7 @@ def pendulum(angle: float, rate: float, time) -> np.ndarray:
     return 2 * np.arcsin(np.sqrt(k) * sn)
 
 
-@pytest.mark.parametrize("integrator", ["adams", "bdf", "runge_kutta_8"])
+@pytest.mark.parametrize("integrator", ["adams", "bdf", "esdirk", "runge_kutta_8"])
 def test_a_parallelogram_swings_as_a_pendulum(integrator):
     model, tolerance, angle = benchmark("four_bars", n=1).model, 1e-8, 1.0
     # About the hanging position: both rods turn about their ends, the bar moves along a circle.

@@ -40,7 +40,7 @@ def blow(stiffness, damping, start):
     return (stiffness * depth * (1 + damping * u)).max()
 
 
-@pytest.mark.parametrize("integrator", ["auto", "bdf", "runge_kutta_8"])
+@pytest.mark.parametrize("integrator", ["auto", "bdf", "esdirk", "runge_kutta_8"])
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6, 1e-8])
 @pytest.mark.parametrize(
     ("stiffness", "damping"), [(1e8, 0), (1e8, 1), (1e9, 1e3), (1e8, 1e5), (1e10, 1e5)]

@@ -57,7 +57,9 @@ def ends(call, error):
     return caught.value
 
 
-@pytest.mark.parametrize("integrator", ["adams", "bdf", "runge_kutta_4", "semi_implicit_euler"])
+@pytest.mark.parametrize(
+    "integrator", ["adams", "bdf", "esdirk", "runge_kutta_4", "semi_implicit_euler"]
+)
 def test_very_many_tiny_steps_between_two_samples(integrator):
     model = lw.scenes.chain(3)
     times = np.array([0.0, 1e-8, 2e-8, 3e-8, 1000.0])

@@ -30,7 +30,7 @@ def test_three_samples_are_a_parabola(times):
     )
 
 
-@pytest.mark.parametrize("integrator", ["adams", "bdf", "auto"])
+@pytest.mark.parametrize("integrator", ["adams", "bdf", "esdirk", "auto"])
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-8, 1e-11])
 def test_a_body_at_rest_is_hit_hard_and_late(integrator, tolerance):
     """A first step that changes nothing by more than the tolerance would be below round-off."""

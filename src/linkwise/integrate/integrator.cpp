@@ -11,7 +11,7 @@ namespace linkwise {
 
 using MakeIntegrator = std::unique_ptr<Integrator>(OdeSystem&, const IntegratorOptions&);
 MakeIntegrator make_auto, make_adams, make_bdf, make_runge_kutta_4, make_semi_implicit_euler;
-MakeIntegrator make_runge_kutta_8;
+MakeIntegrator make_runge_kutta_8, make_esdirk;
 
 namespace {
 
@@ -31,6 +31,13 @@ constexpr IntegratorEntry entries[] = {
                     "for stiff springs and stops",
      .highest_order = 5,
      .make = make_bdf},
+#endif
+#if defined(LINKWISE_SUNDIALS_ARKODE)
+    {.name = "esdirk",
+     .description = "L-stable implicit Runge-Kutta of order 5, Newton iteration solved by the "
+                    "recursion (ARKODE); for elastic links, stiff springs and stops",
+     .highest_order = 5,
+     .make = make_esdirk},
 #endif
     {.name = "runge_kutta_8",
      .description =
@@ -101,7 +108,8 @@ const IntegratorEntry& find_integrator(std::string_view name) {
 #if defined(LINKWISE_WITH_SUNDIALS)
   constexpr std::string_view why = "";
 #else
-  constexpr std::string_view why = "; this build has no SUNDIALS, hence no auto, adams and bdf";
+  constexpr std::string_view why =
+      "; this build has no SUNDIALS, hence no auto, adams, bdf, esdirk";
 #endif
   throw InputError(unknown_name("integrator", name, entries) + std::string(why));
 }

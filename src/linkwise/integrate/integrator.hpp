@@ -47,6 +47,16 @@ struct OdeSystem {
     for (int i = 0; i < size(); ++i) scale[i] = std::abs(y[i]);
   }
 
+  /// Whether it solves its own stiff part, z = (I - gamma J)^-1 r with J the derivatives of f by y
+  /// that springs and dampers make. What J leaves out is left to iterations.
+  virtual bool solves_stiff_part() const { return false; }
+  /// Makes ready for solve_stiff_part() at (t, y).
+  virtual Outcome factor_stiff_part(double /*t*/, const double* /*y*/, double /*gamma*/) {
+    return Outcome::converged;
+  }
+  /// r, z [size()]; not in place.
+  virtual void solve_stiff_part(const double* /*r*/, double* /*z*/) {}
+
   /// Lowers the errors that a step may make, allowed [size()], where more than the state suffers.
   virtual void limit_errors(const double* /*y*/, double* /*allowed*/) const {}
 

@@ -67,6 +67,12 @@ class OwnBodies {
     return now.p;
   }
   void rest(int n) { std::fill_n(at(n).blocks.p_e, at(n).n, S{}); }
+  /// Adds of E [nv] what belongs to body n's coordinates to the diagonal of m_e, before they are
+  /// eliminated.
+  void add_to_diagonal(int n, const S* E) {
+    Body& b = at(n);
+    for (int k = 0; k < b.n; ++k) b.blocks.m_e[packed(k, k)] += E[own_place(model_, n) + k];
+  }
 
   /// The joint of body n starts on a port of its parent.
   void update_port(const SweepInput<S>& in, int n, const Motion<S>& v_parent, BodyState<S>& state) {

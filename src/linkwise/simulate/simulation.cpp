@@ -9,6 +9,7 @@
 #include "linkwise/base/error.hpp"
 #include "linkwise/dynamics/evaluator.hpp"
 #include "linkwise/simulate/given_motion.hpp"
+#include "linkwise/simulate/stiff_part.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {

@@ -46,6 +46,7 @@ struct Start {
 };
 
 class BodyVelocityState;
+class StiffPart;
 
 class Simulation : private OdeSystem {
  public:
@@ -123,6 +124,9 @@ class Simulation : private OdeSystem {
   Outcome project(double t, double* y) override;
   void accepted(double t, const double* y) override;
   void error_scale(const double* y, double* scale) const override;
+  bool solves_stiff_part() const override { return stiff_part_ != nullptr; }
+  Outcome factor_stiff_part(double t, const double* y, double gamma) override;
+  void solve_stiff_part(const double* r, double* z) override;
   void limit_errors(const double* y, double* allowed) const override {
     watch_->limit_errors(y, allowed);
   }
@@ -201,6 +205,7 @@ class Simulation : private OdeSystem {
   std::unique_ptr<DynamicsMethod> method_, output_method_;
   std::unique_ptr<DynamicsMethod> aside_method_, work_method_;  ///< made when first needed
   std::unique_ptr<SolverTolerance> solver_tolerance_;  ///< of one member; null: a fixed one
+  std::unique_ptr<StiffPart> stiff_part_;              ///< null: there is none to solve apart
   std::unique_ptr<LoopProjection> loops_;              ///< null: there are none
   std::string assembled_;
   std::vector<double> start_state_;

@@ -5,6 +5,7 @@
 
 #include "linkwise/dynamics/evaluator.hpp"
 #include "linkwise/simulate/simulation.hpp"
+#include "linkwise/simulate/stiff_part.hpp"
 #include "linkwise/solve/registry.hpp"
 
 namespace linkwise {
@@ -22,6 +23,7 @@ void Simulation::make_methods(double t0) {
   aside_method_.reset();
   work_method_.reset();
   solver_tolerance_.reset();
+  stiff_part_.reset();
   lanes_.reset();
   if (members_ > 1) {
     lanes_ = std::make_unique<BatchEvaluator>(setup_->driven());
@@ -38,6 +40,8 @@ void Simulation::make_methods(double t0) {
     integrated.solver_options.energy_bound = solver_tolerance_->bound();
     solver_tolerance_->start(t0);
   }
+  if (StiffPart::suits(*setup_) && !find_integrator(options.integrator).fixed_step)
+    stiff_part_ = std::make_unique<StiffPart>(*setup_);
   method_ = make_dynamics(setup_->driven(), integrated);
   output_method_ = make_dynamics(setup_->driven(), options.dynamics);
 }
@@ -52,6 +56,20 @@ bool Simulation::follows_error_test() const {
   if (options.dynamics.initial_guess == "zero") return false;
   return !find_integrator(options.integrator).fixed_step;
 }
+
+/// Joints of given motion are where it puts them.
+Outcome Simulation::factor_stiff_part(double t, const double* y, double gamma) {
+  if (setup_->any_motion()) {
+    evaluated_.assign(y, y + size());
+    to_state(evaluated_.data());
+    impose(t, evaluated_.data());
+    parent_axes_.from_child(evaluated_.data(), rates_in(evaluated_.data()));
+    y = evaluated_.data();
+  }
+  return stiff_part_->factor(y, gamma) ? Outcome::converged : Outcome::not_positive_definite;
+}
+
+void Simulation::solve_stiff_part(const double* r, double* z) { stiff_part_->solve(r, z); }
 
 SweepInput<double> Simulation::input(double t, const double* q, const double* v) {
   forces_->evaluate(t, q, v);

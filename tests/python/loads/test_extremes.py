@@ -265,7 +265,9 @@ def test_members_have_what_each_has_alone():
         lw.Recording(quantities=["positon"])
 
 
-@pytest.mark.parametrize("integrator", ["adams", "bdf", "runge_kutta_4", "semi_implicit_euler"])
+@pytest.mark.parametrize(
+    "integrator", ["adams", "bdf", "esdirk", "runge_kutta_4", "semi_implicit_euler"]
+)
 def test_every_integrator(integrator):
     options = {"step": 1e-3} if integrator in ("runge_kutta_4", "semi_implicit_euler") else {}
     run = lw.simulate(pendulum(), duration=1.2, every=1.2, integrator=integrator, **options)

@@ -111,10 +111,12 @@ def test_pace_follows_the_clock():
     assert (pace.count, pace.pieces) == (8, 1)
 
 
-@pytest.mark.parametrize("integrator", ["adams", "bdf", "runge_kutta_4", "semi_implicit_euler"])
+@pytest.mark.parametrize(
+    "integrator", ["adams", "bdf", "esdirk", "runge_kutta_4", "semi_implicit_euler"]
+)
 def test_results_do_not_depend_on_how_the_loop_is_cut(chain, monkeypatch, integrator):
     numerics = {"integrator": integrator}
-    if integrator not in ("adams", "bdf"):
+    if integrator not in ("adams", "bdf", "esdirk"):
         numerics["step"] = 1e-3
     options = {"duration": 1.0, "every": 0.013, "q0": bend(chain), "numerics": numerics}
     runs = []

@@ -9,7 +9,9 @@ void SUNLinearSolverFunctionTable_Destroy(void*);
 void SUNLoggerFunctionTable_Destroy(void*);
 void SUNNonlinearSolverFunctionTable_Destroy(void*);
 void SUNStepperFunctionTable_Destroy(void*);
+void arkode_user_supplied_fn_table_destroy(void*);
 void cvode_user_supplied_fn_table_destroy(void*);
+void mristepinnerstepper_user_supplied_fn_table_destroy(void*);
 
 void SUNContextFunctionTable_Destroy(void*) {}
 void SUNDomEigEstimatorFunctionTable_Destroy(void*) {}
@@ -17,7 +19,9 @@ void SUNLinearSolverFunctionTable_Destroy(void*) {}
 void SUNLoggerFunctionTable_Destroy(void*) {}
 void SUNNonlinearSolverFunctionTable_Destroy(void*) {}
 void SUNStepperFunctionTable_Destroy(void*) {}
+void arkode_user_supplied_fn_table_destroy(void*) {}
 void cvode_user_supplied_fn_table_destroy(void*) {}
+void mristepinnerstepper_user_supplied_fn_table_destroy(void*) {}
 }
 
 #endif

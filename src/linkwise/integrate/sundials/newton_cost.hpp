@@ -14,4 +14,7 @@ constexpr double factor_cost(int n) {
 }
 constexpr double solution_cost(int n) { return n <= largest_dense_size ? n / 60.0 : 0.0; }
 
+/// Of what a system solves itself by its recursion, estimated from the sweeps that it takes.
+constexpr double stiff_factor_cost = 1.0, stiff_solution_cost = 0.5;
+
 }  // namespace linkwise::sundials
