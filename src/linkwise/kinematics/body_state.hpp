@@ -46,7 +46,7 @@ LW_INLINE void carry_on_port(const Element& e, const SweepInput<S>& in, const El
   for (int k = 0; k < e.nv; ++k) relative += in.v[e.v + k] * port.P[k];
   v += relative;
   c += cross(v, relative);
-  c += elastic_column_rate(*e.shape, port, in.q + e.q, in.v + e.v, relative);
+  c += elastic_column_rate(*e.shape, port, in.v + e.v, relative);
 }
 
 /// Walks a stack of elements outward from a frame that moves by v_parent.

@@ -44,7 +44,7 @@ FrameMotion frame_motion(const Model& model, const double* q, const double* v, c
     if (v && element.kind == ElementKind::elastic) {
       ElasticPort<double> port;
       calc_elastic_port(*element.shape, q + element.q, port);
-      change += elastic_column_rate(*element.shape, port, q + element.q, v + element.v, own);
+      change += elastic_column_rate(*element.shape, port, v + element.v, own);
     }
     at.pose = X * at.pose;
     at.velocity = X * at.velocity;

@@ -60,6 +60,7 @@ template <class S>
 struct TurnSeries {
   S sine{}, versine{}, rest{}, d_versine{}, d_rest{};
 
+  TurnSeries() = default;
   explicit TurnSeries(const S& square) {
 #pragma GCC unroll 13
     for (int i = TurnTerms::n - 1; i >= 0; --i) {
@@ -77,6 +78,8 @@ template <class S>
 struct ElasticPort {
   Transform<S> X;
   PerCoordinate<Motion<S>> P;
+  Vec3<S> theta;
+  TurnSeries<S> turn;  ///< of theta
 };
 
 namespace elastic_port {
@@ -115,22 +118,30 @@ LW_INLINE Mat3<S> rotation(const Vec3<S>& t, const TurnSeries<S>& of) {
            v * t.x * t.z + s * t.y, v * t.y * t.z - s * t.x, 1.0 - v * (xx + yy)}};
 }
 
+template <class S>
+LW_INLINE Transform<S> pose(const ElasticShape& shape, const S* eta, const Vec3<S>& t,
+                            const TurnSeries<S>& of) {
+  Vec3<S> r = 0.5 * form(shape, eta, eta);
+  r += shape.rest;
+  for (int k = 0; k < shape.n; ++k) r += eta[k] * shape.Phi[k];
+  return {rotation(t, of), r};
+}
+
 }  // namespace elastic_port
 
 template <class S>
 LW_INLINE Transform<S> elastic_pose(const ElasticShape& shape, const S* eta) {
   const Vec3<S> t = elastic_port::theta(shape, eta);
-  Vec3<S> r = 0.5 * elastic_port::form(shape, eta, eta);
-  r += shape.rest;
-  for (int k = 0; k < shape.n; ++k) r += eta[k] * shape.Phi[k];
-  return {elastic_port::rotation(t, TurnSeries<S>(dot(t, t))), r};
+  return elastic_port::pose(shape, eta, t, TurnSeries<S>(dot(t, t)));
 }
 
 template <class S>
 LW_INLINE void calc_elastic_port(const ElasticShape& shape, const S* eta, ElasticPort<S>& out) {
-  out.X = elastic_pose(shape, eta);
-  const Vec3<S> t = elastic_port::theta(shape, eta);
-  const TurnSeries<S> of(dot(t, t));
+  out.theta = elastic_port::theta(shape, eta);
+  out.turn = TurnSeries<S>(dot(out.theta, out.theta));
+  const Vec3<S>& t = out.theta;
+  const TurnSeries<S>& of = out.turn;
+  out.X = elastic_port::pose(shape, eta, t, of);
   for (int k = 0; k < shape.n; ++k) {
     Vec3<S> B{shape.Phi[k].x + S{}, shape.Phi[k].y + S{}, shape.Phi[k].z + S{}};
     S* const parts[] = {&B.x, &B.y, &B.z};
@@ -150,9 +161,10 @@ LW_INLINE void calc_elastic_port(const ElasticShape& shape, const S* eta, Elasti
 /// The rate of P times xi. P xi is the port's motion against the body.
 template <class S>
 LW_INLINE Motion<S> elastic_column_rate(const ElasticShape& shape, const ElasticPort<S>& port,
-                                        const S* eta, const S* xi, const Motion<S>& relative) {
-  const Vec3<S> t = elastic_port::theta(shape, eta), dt = elastic_port::theta(shape, xi);
-  const TurnSeries<S> of(dot(t, t));
+                                        const S* xi, const Motion<S>& relative) {
+  const Vec3<S>& t = port.theta;
+  const Vec3<S> dt = elastic_port::theta(shape, xi);
+  const TurnSeries<S>& of = port.turn;
   const S d_square = 2.0 * dot(t, dt);
   const Vec3<S> once = cross(t, dt);
   return {port.X.R * elastic_port::form(shape, xi, xi) - cross(relative.ang, relative.lin),

@@ -64,7 +64,7 @@ TEST(ElasticPort, TheirRateIsThatOfTheColumns) {
   constexpr double h = 1e-5;
   const ElasticPort<double> now = port_after(0);
   const Motion<double> after = relative(port_after(h)), before = relative(port_after(-h));
-  const Motion<double> found = elastic_column_rate(shape(), now, eta, xi, relative(now));
+  const Motion<double> found = elastic_column_rate(shape(), now, xi, relative(now));
   EXPECT_NEAR(found.lin.x, (after.lin.x - before.lin.x) / (2 * h), 1e-9);
   EXPECT_NEAR(found.lin.y, (after.lin.y - before.lin.y) / (2 * h), 1e-9);
   EXPECT_NEAR(found.lin.z, (after.lin.z - before.lin.z) / (2 * h), 1e-9);
