@@ -164,9 +164,10 @@ void ModelBuilder::set_floating_base(std::string joint_name) {
 ModelSpec ModelBuilder::spec(bool keep_fixed) const {
   ModelSpec spec = spec_;
   spec.keep_fixed = keep_fixed;
+  if (flexible_.empty()) return spec;
+  FlexibleLinks links(spec);
   for (const auto& any : flexible_)
-    std::visit([&](const auto& flexible) { spec = with_flexible_link(std::move(spec), flexible); },
-               any);
+    std::visit([&](const auto& flexible) { links.add(flexible); }, any);
   return spec;
 }
 

@@ -47,7 +47,7 @@ class ModelBuilder {
   void add_spring(LoopJointSpec loop, double length, Properties properties);
   void add_coupling(CouplingSpec coupling) { spec_.couplings.push_back(std::move(coupling)); }
 
-  /// Once all joints are there: spec() does it. Throws then as with_flexible_link.
+  /// Once all joints are there: spec() does it. Throws then as FlexibleLinks::add.
   void make_flexible(FlexibleLink flexible) { flexible_.emplace_back(std::move(flexible)); }
   void make_flexible(ModalLink flexible) { flexible_.emplace_back(std::move(flexible)); }
 

@@ -15,6 +15,8 @@ namespace {
 
 double length_of(const Vec3<double>& a) { return std::sqrt(dot(a, a)); }
 
+using Attached = FlexibleLinks::Attached;
+
 /// Is a point of a link where its elastic body starts?
 bool is_start(const Vec3<double>& point, double length) {
   return length_of(point) <= 1e-9 * (1 + length);
@@ -22,11 +24,11 @@ bool is_start(const Vec3<double>& point, double length) {
 
 /// The joints that the link carries are all at this point, if there are any, but for those that
 /// close loops at its start.
-std::optional<Vec3<double>> carried_at(const ModelSpec& spec, const std::string& link,
-                                       const std::string& head) {
+std::optional<Vec3<double>> carried_at(const ModelSpec& spec, const Attached& on,
+                                       const std::string& link, const std::string& head) {
   const JointSpec* first = nullptr;
-  for (const JointSpec& joint : spec.joints) {
-    if (joint.parent != link) continue;
+  for (const int j : on.joints) {
+    const JointSpec& joint = spec.joints[j];
     if (!first) first = &joint;
     if (length_of(joint.translation - first->translation) >
         1e-9 * (1 + length_of(joint.translation)))
@@ -36,8 +38,9 @@ std::optional<Vec3<double>> carried_at(const ModelSpec& spec, const std::string&
   }
   const std::string* name = first ? &first->name : nullptr;
   Vec3<double> end = first ? first->translation : Vec3<double>{};
-  for (const LoopJointSpec& loop : spec.loop_joints)
+  for (const int l : on.loops)
     for (const bool parent : {true, false}) {
+      const LoopJointSpec& loop = spec.loop_joints[l];
       if ((parent ? loop.joint.parent : loop.joint.child) != link) continue;
       const Vec3<double>& point = parent ? loop.joint.translation : loop.child_translation;
       if (is_start(point, length_of(end))) continue;
@@ -52,9 +55,10 @@ std::optional<Vec3<double>> carried_at(const ModelSpec& spec, const std::string&
   return end;
 }
 
-Vec3<double> end_of(const ModelSpec& spec, const FlexibleLink& flexible, const std::string& head) {
+Vec3<double> end_of(const ModelSpec& spec, const Attached& on, const FlexibleLink& flexible,
+                    const std::string& head) {
   if (flexible.end) return *flexible.end;
-  const std::optional<Vec3<double>> end = carried_at(spec, flexible.link, head);
+  const std::optional<Vec3<double>> end = carried_at(spec, on, flexible.link, head);
   if (!end)
     throw InputError(head +
                      "carries no joint that would say where it ends; give end, a point in "
@@ -116,8 +120,8 @@ void set_straight(LinkSpec& link, const BeamProperties& of, const Mat3<double>& 
 
 /// What hung on the link hangs on `end`, whose frame is that of the beam, moved there. Joints that
 /// close loops at its start stay on the link.
-void move_to_end(ModelSpec& spec, const std::string& link, const std::string& end,
-                 const Mat3<double>& axes, const Vec3<double>& at) {
+void move_to_end(ModelSpec& spec, const Attached& on, const std::string& link,
+                 const std::string& end, const Mat3<double>& axes, const Vec3<double>& at) {
   const auto move = [&](std::string& name, Mat3<double>& rotation, Vec3<double>& translation) {
     if (name != link) return;
     name = end;
@@ -125,8 +129,12 @@ void move_to_end(ModelSpec& spec, const std::string& link, const std::string& en
     translation = transpose_times(axes, translation - at);
     if (length_of(translation) <= 1e-9 * (1 + length_of(at))) translation = {};
   };
-  for (JointSpec& joint : spec.joints) move(joint.parent, joint.rotation, joint.translation);
-  for (LoopJointSpec& loop : spec.loop_joints) {
+  for (const int j : on.joints) {
+    JointSpec& joint = spec.joints[j];
+    move(joint.parent, joint.rotation, joint.translation);
+  }
+  for (const int l : on.loops) {
+    LoopJointSpec& loop = spec.loop_joints[l];
     if (!is_start(loop.joint.translation, length_of(at)))
       move(loop.joint.parent, loop.joint.rotation, loop.joint.translation);
     if (!is_start(loop.child_translation, length_of(at)))
@@ -156,19 +164,6 @@ std::string frequencies(const BeamProperties& of, double length) {
 
 std::string head_of(const ModelSpec& spec, const std::string& name) {
   return "flexible link '" + name + "'" + source_of(spec) + ": ";
-}
-
-LinkSpec& rigid_link(ModelSpec& spec, const std::string& name, const std::string& head) {
-  const auto found = std::find_if(spec.links.begin(), spec.links.end(),
-                                  [&](const LinkSpec& link) { return link.name == name; });
-  if (found == spec.links.end()) {
-    std::vector<std::string> known;
-    for (const LinkSpec& link : spec.links) known.push_back(link.name);
-    throw InputError(head + "does not exist" + suggest(name, known));
-  }
-  if (found->body_kind != BodyKind::rigid)
-    throw InputError(head + "is flexible already; make it so once");
-  return *found;
 }
 
 /// Of a modal body, clamped where it starts and free elsewhere.
@@ -205,12 +200,44 @@ std::string point_text(const Vec3<double>& r) {
 
 }  // namespace
 
-ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
+FlexibleLinks::FlexibleLinks(ModelSpec& spec) : spec_(spec) {
+  for (size_t i = 0; i < spec.links.size(); ++i) link_.try_emplace(spec.links[i].name, i);
+  for (size_t j = 0; j < spec.joints.size(); ++j)
+    attached_[spec.joints[j].parent].joints.push_back(static_cast<int>(j));
+  for (size_t l = 0; l < spec.loop_joints.size(); ++l) {
+    const JointSpec& joint = spec.loop_joints[l].joint;
+    attached_[joint.parent].loops.push_back(static_cast<int>(l));
+    if (joint.child != joint.parent) attached_[joint.child].loops.push_back(static_cast<int>(l));
+  }
+}
+
+LinkSpec& FlexibleLinks::rigid_link(const std::string& name, const std::string& head) {
+  const auto found = link_.find(name);
+  if (found == link_.end()) {
+    std::vector<std::string> known;
+    for (const LinkSpec& link : spec_.links) known.push_back(link.name);
+    throw InputError(head + "does not exist" + suggest(name, known));
+  }
+  LinkSpec& link = spec_.links[found->second];
+  if (link.body_kind != BodyKind::rigid)
+    throw InputError(head + "is flexible already; make it so once");
+  return link;
+}
+
+void FlexibleLinks::put(const JointSpec& joint, LinkSpec link) {
+  link_.try_emplace(link.name, spec_.links.size());
+  spec_.joints.push_back(joint);
+  spec_.links.push_back(std::move(link));
+}
+
+void FlexibleLinks::add(const FlexibleLink& flexible) {
+  ModelSpec& spec = spec_;
   const std::string& name = flexible.link;
   const std::string head = head_of(spec, name);
-  LinkSpec& link = rigid_link(spec, name, head);
+  LinkSpec& link = rigid_link(name, head);
+  const Attached& on = attached_[name];
   check_numbers(flexible, head);
-  const Vec3<double> end = end_of(spec, flexible, head);
+  const Vec3<double> end = end_of(spec, on, flexible, head);
   if (!(length_of(end) > 0) || !std::isfinite(length_of(end)))
     throw InputError(head +
                      "its ends coincide; give end, the point where it ends, apart from its "
@@ -238,7 +265,8 @@ ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
   std::copy(axes.m, axes.m + 9, of.axes);
   set_straight(link, of, axes);  // before others are added
   const std::string tip = name + ":end";
-  move_to_end(spec, name, tip, axes, end);
+  move_to_end(spec, on, name, tip, axes, end);
+  attached_[tip] = on;
 
   JointSpec joint;
   joint.type = JointType::elastic;
@@ -251,24 +279,25 @@ ModelSpec with_flexible_link(ModelSpec spec, const FlexibleLink& flexible) {
     joint.name = name + ":" + std::to_string(i);
     joint.parent = before;
     joint.child = i < flexible.bodies ? name + ":" + std::to_string(i + 1) : tip;
-    spec.joints.push_back(joint);
-    spec.links.push_back({joint.child, 0, {}, {}});
-    if (i < flexible.bodies) set_straight(spec.links.back(), of, identity);
+    LinkSpec next{joint.child, 0, {}, {}};
+    if (i < flexible.bodies) set_straight(next, of, identity);
+    put(joint, std::move(next));
     before = joint.child;
     joint.rotation = identity;
     joint.translation = {of.length, 0, 0};
   }
   spec.notes.push_back({NoteLevel::info, name, frequencies(of, length)});
-  return spec;
 }
 
-ModelSpec with_flexible_link(ModelSpec spec, const ModalLink& flexible) {
+void FlexibleLinks::add(const ModalLink& flexible) {
+  ModelSpec& spec = spec_;
   const std::string& name = flexible.link;
   const std::string head = head_of(spec, name);
-  LinkSpec& link = rigid_link(spec, name, head);
+  LinkSpec& link = rigid_link(name, head);
+  const Attached& on = attached_[name];
   if (const std::string fault = ModalBody::fault(flexible.parameters); !fault.empty())
     throw InputError(head + fault);
-  const std::optional<Vec3<double>> at = carried_at(spec, name, head);
+  const std::optional<Vec3<double>> at = carried_at(spec, on, name, head);
   std::vector<double> parameters = flexible.parameters;
   double& has_port = parameters[offsetof(ModalProperties, has_port) / sizeof(double)];
   if (at && has_port == 0)
@@ -291,7 +320,8 @@ ModelSpec with_flexible_link(ModelSpec spec, const ModalLink& flexible) {
                      ", and its outboard handle is at " + point_text(end) +
                      " in the link's frame; let the joints be there");
   const std::string tip = name + ":end";
-  move_to_end(spec, name, tip, axes, at ? *at : end);
+  move_to_end(spec, on, name, tip, axes, at ? *at : end);
+  attached_[tip] = on;
   JointSpec joint;
   joint.type = JointType::elastic;
   joint.name = name + ":1";
@@ -299,9 +329,7 @@ ModelSpec with_flexible_link(ModelSpec spec, const ModalLink& flexible) {
   joint.child = tip;
   joint.rotation = axes;
   joint.translation = end;
-  spec.joints.push_back(joint);
-  spec.links.push_back({tip, 0, {}, {}});
-  return spec;
+  put(joint, {tip, 0, {}, {}});
 }
 
 }  // namespace linkwise
