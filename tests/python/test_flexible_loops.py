@@ -502,3 +502,43 @@ def test_joints_of_loops_are_at_the_ends_of_a_flexible_link():
     # Where the beam starts a rod holds its frame, which nothing bends.
     model = frame((0, 0, 0))
     assert lw.indeterminacy(model, model.initial_configuration()).rank == 0
+
+
+def test_a_body_of_finite_elements_in_a_loop_accelerates_as_one_dense_matrix_says():
+    rng = np.random.default_rng(5)
+    nodes = np.array([[x, y, z] for x in (0.0, 1.0, 2.0) for y, z in ((0, 0.2), (0.2, 0), (0, 0))])
+    stiffness, mass = np.zeros((27, 27)), 0.5 * np.eye(27)
+    for i in range(9):
+        for j in range(i):
+            d = nodes[j] - nodes[i]
+            at = np.r_[3 * i : 3 * i + 3, 3 * j : 3 * j + 3]
+            stiffness[np.ix_(at, at)] += 1e6 / (d @ d) ** 1.5 * np.outer(np.r_[-d, d], np.r_[-d, d])
+    ends = {"inboard": [0, 1, 2], "outboard": [6, 7, 8]}
+    body = lw.FlexibleBody.from_matrices(mass, stiffness, nodes, ends, modes=2)
+    end = nodes[6:].mean(axis=0) - nodes[:3].mean(axis=0)
+
+    def machine(closed):
+        builder = lw.ModelBuilder("stayed")
+        builder.add_link("base")
+        builder.add_link("boom")
+        builder.add_link("load", mass=2.0, inertia=np.eye(3))
+        builder.add_joint("foot", "spherical", "base", "boom")
+        builder.add_joint("hook", "spherical", "boom", "load", translation=end)
+        if closed:
+            pin = {"translation": end, "child_translation": end}
+            builder.add_loop("pin", "spherical", "base", "boom", **pin)
+        builder.make_flexible("boom", body=body)
+        return builder.build()
+
+    free, model = machine(False), machine(True)
+    q = model.initial_configuration()
+    q[model.q_slice("boom:1")] = 1e-3 * rng.normal(size=body.n)
+    found = lw.assemble(model, q, rng.normal(size=model.nv))
+    q, v, rest, tau = found.q, found.v, np.zeros(model.nv), rng.normal(size=model.nv)
+    K = lw.frame_jacobian(free, q, "boom:end")[:3]
+    full = np.block([[lw.mass_matrix(free, q), K.T], [K, np.zeros((3, 3))]])
+    asked = -lw.frame_acceleration(free, q, v, rest, "boom:end")[:3]
+    right = np.r_[tau - lw.inverse_dynamics(free, q, v, rest), asked]
+    want = np.linalg.solve(full, right)[: model.nv]
+    got = lw.forward_dynamics(model, q, v, tau)
+    assert np.abs(got - want).max() < 1e-9 * np.abs(want).max()

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from linkwise._core import Model
 
 #: Of a model and one evaluation of it, for each element.
-BYTES_PER_ELEMENT = 20_000
+BYTES_PER_ELEMENT = 8_000
 
 _KINDS = {"weld": "fixed", "spherical": "spherical"}
 _TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
