@@ -195,6 +195,34 @@ def test_rigid_knots_do_not_widen_it(mass):
     assert iterations(model, q, v)[0] <= 13
 
 
+@pytest.mark.parametrize("held", ["corners", "none"])
+def test_nets_of_any_size_take_as_many_iterations(held):
+    counts = []
+    for n in (4, 20):
+        model = lw.scenes.net(n, n, held=held)
+        rng = np.random.default_rng(n)
+        q, v = model.initial_configuration(), np.zeros(model.nv)
+        found = _core.graph_spectrum(model, q)
+        np.testing.assert_allclose(found.bound, (0.5, 1.5), atol=1e-6)
+        assert found.found.smallest >= 0.5 * (1 - 1e-9)
+        assert found.found.largest <= 1.5 * (1 + 1e-9)
+        tau = rng.normal(size=model.nv)
+        method = {"method": "constraint_force", "passive": True}
+        direct = lw.forward_dynamics(model, q, v, tau, **method)
+        iterated = lw.forward_dynamics(
+            model, q, v, tau, solver="conjugate_gradient", tolerance=1e-10, **method
+        )
+        np.testing.assert_allclose(iterated, direct, rtol=0, atol=1e-6 * np.abs(direct).max())
+        counts.append(iterations(model, q, v)[0])
+        if n == 4:
+            by_recursion = lw.forward_dynamics(
+                model, q, v, tau, method="articulated_body", passive=True
+            )
+            scale = np.abs(by_recursion).max()
+            np.testing.assert_allclose(direct, by_recursion, rtol=0, atol=1e-9 * scale)
+    assert max(counts) <= 13
+
+
 def test_rigid_neighbours_have_no_bound():
     builder = lw.ModelBuilder("hands")
     for link in ("base", "boom", "hand", "tool"):

@@ -478,11 +478,20 @@ class TestWhatElseLoopsDo:
         assert loads[-2] + loads[-1] == pytest.approx(whole, abs=1e-8 * np.abs(whole).max())
         assert loads[-2, :5] == pytest.approx(2 * loads[-1, :5], abs=1e-8 * np.abs(whole).max())
 
-    def test_methods_for_rigid_bodies_are_refused(self):
+    def test_all_constraint_forces_at_once_give_the_same(self):
         model, q, v, _ = self.closed()
-        for given in ({"method": "constraint_force"}, {"solver": "conjugate_gradient"}):
-            with pytest.raises(lw.InputError, match="use method articulated_body"):
-                lw.forward_dynamics(model, q, v, **given)
+        want = lw.forward_dynamics(model, q, v, method="articulated_body", passive=True)
+        for solver, bits in (("thomas", 1e-10), ("conjugate_gradient", 1e-6)):
+            given = {"method": "constraint_force", "solver": solver, "passive": True}
+            a = lw.forward_dynamics(model, q, v, **given)
+            np.testing.assert_allclose(a, want, rtol=0, atol=bits * np.abs(want).max())
+        loads = [
+            lw.joint_loads(model, q, v, method=name, passive=True)
+            for name in ("constraint_force", "articulated_body")
+        ]
+        np.testing.assert_allclose(*loads, rtol=0, atol=1e-9 * np.abs(loads[1]).max())
+        with pytest.raises(lw.InputError, match="takes trees, and this machine has closed loops"):
+            lw.forward_dynamics(model, q, v, method="constraint_force", solver="two_level")
 
 
 def test_joints_of_loops_are_at_the_ends_of_a_flexible_link():

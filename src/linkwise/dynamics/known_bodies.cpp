@@ -15,9 +15,6 @@ bool takes(const DynamicsEntry& method, BodyKind kind) {
 }  // namespace
 
 void require_known_bodies(const Model& model, const DynamicsEntry& method) {
-  if (!model.own_element.empty() && method.uses_solver)
-    refuse_loops(model, "method " + std::string(method.name) + " with flexible links",
-                 "use method articulated_body");
   for (int n = 0; n < model.n_bodies(); ++n) {
     const BodyKind kind = model.topology[n].body_kind;
     if (takes(method, kind)) continue;

@@ -63,8 +63,7 @@ double least_graph_work(const BlockGraph& graph) {
 
 /// Or less than that where it is `too_much` in any case.
 double graph_work(const Model& model, double too_much) {
-  if (!model.own_element.empty() || !refusal_of_graph(model).empty())
-    return std::numeric_limits<double>::infinity();
+  if (!refusal_of_graph(model).empty()) return std::numeric_limits<double>::infinity();
   const BlockGraph graph = make_constraint_graph(model);
   if (const double least = least_graph_work(graph); least > too_much) return least;
   return work_of(graph, elimination_order(graph)) + per_node * graph.n();

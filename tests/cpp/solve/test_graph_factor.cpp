@@ -160,8 +160,9 @@ TEST(GraphFactor, SolvesAsOneDenseMatrix) {
   }
 }
 
-/// Wide hubs in a row, each with a joint at either end; a knot between two of them where `knots`.
-BlockGraph chain_of_wide_hubs(int n, bool knots, Draws& draws) {
+/// Wide hubs in a row, each with a joint at either end; a knot between two of them where `knots`,
+/// the first of which is held where `held`.
+BlockGraph chain_of_wide_hubs(int n, bool knots, bool held, Draws& draws) {
   std::vector<int> dims;
   std::vector<std::vector<int>> of_node;
   const int step = knots ? 2 : 1;
@@ -171,6 +172,10 @@ BlockGraph chain_of_wide_hubs(int n, bool knots, Draws& draws) {
     dims.push_back(1 + draws.below(3));
     of_node.push_back({hub});
     if (hub > 0) of_node.back().push_back(hub - 1);
+  }
+  if (held) {
+    dims.push_back(3);
+    of_node.push_back({1});
   }
   BlockGraph A;
   A.set_structure(dims, of_node, is_wide);
@@ -185,9 +190,9 @@ BlockGraph chain_of_wide_hubs(int n, bool knots, Draws& draws) {
 
 // Column by column, against P put together from what each body adds.
 TEST(KnotJacobi, SolvesWhatItsBodiesAddUpTo) {
-  for (const bool knots : {false, true}) {
+  for (const int kind : {0, 1, 2}) {
     Draws draws(11);
-    const BlockGraph A = chain_of_wide_hubs(6, knots, draws);
+    const BlockGraph A = chain_of_wide_hubs(6, kind > 0, kind == 2, draws);
     KnotJacobi jacobi;
     ASSERT_EQ(jacobi.factor(A), -1);
     const auto n = static_cast<size_t>(A.size());
@@ -226,7 +231,7 @@ TEST(KnotJacobi, BoundsTheSpectrum) {
   for (int sample = 0; sample < 12; ++sample) {
     SCOPED_TRACE(sample);
     Draws draws(sample);
-    const BlockGraph A = chain_of_wide_hubs(12, sample % 2, draws);
+    const BlockGraph A = chain_of_wide_hubs(12, sample % 3 > 0, sample % 3 == 2, draws);
     KnotJacobi P;
     ASSERT_EQ(P.factor(A), -1);
     const KnotJacobi::Bound bound = P.bound(A);

@@ -25,34 +25,48 @@ const double* row_of(const std::vector<double>& packed_blocks, int i) {
 
 bool is_elastic(const BlockGraph& A, int hub) { return A.width(hub) > 6; }
 
-/// A rigid hub whose joints all end on an elastic one besides.
-bool is_knot(const BlockGraph& A, int hub) {
-  if (is_elastic(A, hub)) return false;
+/// Rows of a knot that is factored as one matrix, at most.
+constexpr int most_dense_rows = 96;
+
+struct Ends {
   int rows = 0;
+  bool on_elastic = true;  ///< and on the ground, none on another rigid hub
+  bool on_ground = false;  ///< some of them
+};
+
+/// Where joints of a hub end besides.
+Ends ends_of(const BlockGraph& A, int hub) {
+  Ends out;
   for (int e = A.hub_begin[hub]; e < A.hub_begin[hub + 1]; ++e) {
     const int i = A.end_node[e];
     if (A.dim(i) == 0) continue;
-    rows += A.dim(i);
-    bool has_elastic = false;
+    out.rows += A.dim(i);
+    out.on_ground |= A.node_begin[i + 1] - A.node_begin[i] == 1;
     for (int at = A.node_begin[i]; at < A.node_begin[i + 1]; ++at) {
       const int other = A.end_hub[A.node_ends[at]];
-      has_elastic |= is_elastic(A, other);
-      if (other != hub && !is_elastic(A, other)) return false;
+      out.on_elastic &= other == hub || is_elastic(A, other);
     }
-    if (!has_elastic) return false;
   }
-  return rows > 0;
+  return out;
 }
 
 }  // namespace
 
 void KnotJacobi::find_knots(const BlockGraph& A) {
   knots_.clear();
-  is_in_knot_.assign(A.n(), 0);
+  is_in_knot_.assign(A.n(), in_none);
+  held_.clear();
   for (int k = 0; k < A.n_hubs(); ++k) {
-    if (!is_knot(A, k)) continue;
-    knots_.push_back(k);
-    for (int e = A.hub_begin[k]; e < A.hub_begin[k + 1]; ++e) is_in_knot_[A.end_node[e]] = 1;
+    if (is_elastic(A, k)) continue;
+    const Ends ends = ends_of(A, k);
+    if (ends.rows == 0 || !ends.on_elastic) continue;
+    if (ends.on_ground && ends.rows > most_dense_rows) continue;
+    if (ends.on_ground)
+      held_.push_back({k, ends.rows, {}});
+    else
+      knots_.push_back(k);
+    for (int e = A.hub_begin[k]; e < A.hub_begin[k + 1]; ++e)
+      is_in_knot_[A.end_node[e]] = ends.on_ground ? in_held : in_free;
   }
 }
 
@@ -60,20 +74,64 @@ int KnotJacobi::factor(const BlockGraph& A) {
   find_knots(A);
   block_.resize(21 * static_cast<std::size_t>(A.n()));
   for (int i = 0; i < A.n(); ++i) {
+    if (is_in_knot_[i] == in_held) continue;
     double* const L = row_of(block_, i);
     const int rows = A.dim(i);
-    for (int r = 0; r < rows; ++r)
-      for (int c = 0; c <= r; ++c) L[packed(r, c)] = r == c ? A.own[A.offset[i] + r] : 0.0;
-    for (int at = A.node_begin[i]; at < A.node_begin[i + 1]; ++at)
-      if (const int e = A.node_ends[at]; !is_in_knot_[i] || is_elastic(A, A.end_hub[e]))
-        A.add_to_diagonal(e, L);
+    calc_elastic_part(A, i, L);
     if (rows == 1 && L[0] == 0) L[0] = 1;  // a row that holds nothing
     if (!cholesky_factor(rows, L, 0.0)) return i;
   }
   inner_.resize(21 * knots_.size());
   for (int at = 0; at < static_cast<int>(knots_.size()); ++at)
     if (!factor_knot(A, at)) return A.end_node[A.hub_begin[knots_[at]]];
+  for (Held& knot : held_)
+    if (!factor_held(A, knot)) return A.end_node[A.hub_begin[knot.hub]];
   return -1;
+}
+
+/// A node's block but for what a knot adds to it.
+void KnotJacobi::calc_elastic_part(const BlockGraph& A, int i, double* block) const {
+  for (int r = 0; r < A.dim(i); ++r)
+    for (int c = 0; c <= r; ++c) block[packed(r, c)] = r == c ? A.own[A.offset[i] + r] : 0.0;
+  for (int at = A.node_begin[i]; at < A.node_begin[i + 1]; ++at)
+    if (const int e = A.node_ends[at]; !is_in_knot_[i] || is_elastic(A, A.end_hub[e]))
+      A.add_to_diagonal(e, block);
+}
+
+/// P itself: joints with the ground have no elastic end, and so no D^-1.
+bool KnotJacobi::factor_held(const BlockGraph& A, Held& knot) {
+  const double* const C = A.compliance(knot.hub);
+  knot.L.assign(static_cast<std::size_t>(knot.rows) * (knot.rows + 1) / 2, 0.0);
+  std::vector<const double*> levers;
+  for (int e = A.hub_begin[knot.hub]; e < A.hub_begin[knot.hub + 1]; ++e) {
+    const int node = A.end_node[e], first = static_cast<int>(levers.size());
+    double own[21];
+    calc_elastic_part(A, node, own);
+    for (int r = 0; r < A.dim(node); ++r) {
+      levers.push_back(A.levers.data() + A.lever_begin[e] + 6 * std::size_t(r));
+      for (int c = 0; c <= r; ++c) knot.L[packed(first + r, first + c)] = own[packed(r, c)];
+    }
+  }
+  for (int j = 0; j < knot.rows; ++j) {
+    double y[6] = {};
+    for (int r = 0; r < 6; ++r)
+      for (int c = 0; c < 6; ++c) y[r] += C[6 * r + c] * levers[j][c];
+    for (int i = j; i < knot.rows; ++i)
+      for (int c = 0; c < 6; ++c) knot.L[packed(i, j)] += levers[i][c] * y[c];
+  }
+  return cholesky_factor(knot.rows, knot.L.data(), 0.0);
+}
+
+void KnotJacobi::solve_held(const BlockGraph& A, const Held& knot, std::span<double> z) const {
+  double x[most_dense_rows];
+  const auto each = [&](auto&& f) {
+    int at = 0;
+    for (int e = A.hub_begin[knot.hub]; e < A.hub_begin[knot.hub + 1]; ++e)
+      for (int i = A.offset[A.end_node[e]]; i < A.offset[A.end_node[e] + 1]; ++i) f(x[at++], z[i]);
+  };
+  each([](double& to, const double& from) { to = from; });
+  cholesky_solve(knot.rows, knot.L.data(), x);
+  each([](const double& from, double& to) { to = from; });
 }
 
 bool KnotJacobi::factor_knot(const BlockGraph& A, int at) {
@@ -108,12 +166,14 @@ void KnotJacobi::solve(const BlockGraph& A, std::span<const double> r, std::span
   std::copy(r.begin(), r.end(), z.begin());
   Tiles(A.n(), TileOf::nodes).for_each(executor, [&](int, int begin, int end) {
     for (int i = begin; i < end; ++i)
-      cholesky_solve(A.dim(i), row_of(block_, i), z.data() + A.offset[i]);
+      if (is_in_knot_[i] != in_held)
+        cholesky_solve(A.dim(i), row_of(block_, i), z.data() + A.offset[i]);
   });
   const int n = static_cast<int>(knots_.size());
   Tiles(n, TileOf::nodes).for_each(executor, [&](int, int begin, int end) {
     for (int at = begin; at < end; ++at) solve_knot(A, at, z);
   });
+  for (const Held& knot : held_) solve_held(A, knot, z);
 }
 
 /// z holds D^-1 r.
@@ -141,6 +201,7 @@ KnotJacobi::Bound KnotJacobi::bound(const BlockGraph& A) const {
   Bound out;
   std::vector<char> is_whole(A.n_hubs());
   for (const int k : knots_) is_whole[k] = 1;
+  for (const Held& knot : held_) is_whole[knot.hub] = 1;
   for (int k = 0; k < A.n_hubs(); ++k) {
     if (is_whole[k]) continue;
     // H where D_b is 1.

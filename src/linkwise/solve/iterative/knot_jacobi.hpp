@@ -6,7 +6,8 @@
 // all around, it is a knot and is taken as a whole,
 //     P = sum_elastic D_b + sum_knots A_b,
 // with the same bound. P is solved knot by knot: with D of the elastic ends, H and C of the knot,
-//     P^-1 = D^-1 - D^-1 H (C^-1 + H^T D^-1 H)^-1 H^T D^-1     [hager1989].
+//     P^-1 = D^-1 - D^-1 H (C^-1 + H^T D^-1 H)^-1 H^T D^-1     [hager1989],
+// or by a dense factor where a joint with the ground leaves D singular.
 #include <span>
 #include <vector>
 
@@ -35,11 +36,21 @@ class KnotJacobi {
   void find_knots(const BlockGraph& A);
   bool factor_knot(const BlockGraph& A, int at);
   void solve_knot(const BlockGraph& A, int at, std::span<double> z) const;
+  /// A knot with joints on the ground.
+  struct Held {
+    int hub, rows;
+    std::vector<double> L;  ///< factor of its part of P
+  };
+  bool factor_held(const BlockGraph& A, Held& knot);
+  void solve_held(const BlockGraph& A, const Held& knot, std::span<double> z) const;
+  void calc_elastic_part(const BlockGraph& A, int node, double* block) const;
 
-  std::vector<int> knots_;        ///< hubs
-  std::vector<char> is_in_knot_;  ///< by node: its hub's part is not in the block
-  std::vector<double> block_;     ///< factor of each node's block, 21 numbers
-  std::vector<double> inner_;     ///< factor of C^-1 + H^T D^-1 H of each knot, 21 numbers
+  enum InKnot : char { in_none, in_free, in_held };
+  std::vector<int> knots_;  ///< hubs, of knots that only elastic bodies hold
+  std::vector<Held> held_;
+  std::vector<InKnot> is_in_knot_;  ///< by node
+  std::vector<double> block_;       ///< factor of each node's block, 21 numbers
+  std::vector<double> inner_;       ///< factor of C^-1 + H^T D^-1 H of each knot, 21 numbers
 };
 
 }  // namespace linkwise
