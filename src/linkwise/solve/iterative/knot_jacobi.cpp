@@ -25,13 +25,14 @@ const double* row_of(const std::vector<double>& packed_blocks, int i) {
 
 bool is_elastic(const BlockGraph& A, int hub) { return A.width(hub) > 6; }
 
-/// Rows of a knot that is factored as one matrix, at most.
+/// Rows of a knot that is factored as one matrix, at most; pivots of it that are too small, over
+/// what they came from: such rows repeat each other.
 constexpr int most_dense_rows = 96;
+constexpr double repeated = 1e-10;
 
 struct Ends {
   int rows = 0;
-  bool on_elastic = true;  ///< and on the ground, none on another rigid hub
-  bool on_ground = false;  ///< some of them
+  bool on_rigid = false, on_elastic = false, on_ground = false;  ///< some of them
 };
 
 /// Where joints of a hub end besides.
@@ -44,7 +45,7 @@ Ends ends_of(const BlockGraph& A, int hub) {
     out.on_ground |= A.node_begin[i + 1] - A.node_begin[i] == 1;
     for (int at = A.node_begin[i]; at < A.node_begin[i + 1]; ++at) {
       const int other = A.end_hub[A.node_ends[at]];
-      out.on_elastic &= other == hub || is_elastic(A, other);
+      if (other != hub) (is_elastic(A, other) ? out.on_elastic : out.on_rigid) = true;
     }
   }
   return out;
@@ -59,7 +60,7 @@ void KnotJacobi::find_knots(const BlockGraph& A) {
   for (int k = 0; k < A.n_hubs(); ++k) {
     if (is_elastic(A, k)) continue;
     const Ends ends = ends_of(A, k);
-    if (ends.rows == 0 || !ends.on_elastic) continue;
+    if (!ends.on_elastic || ends.on_rigid) continue;
     if (ends.on_ground && ends.rows > most_dense_rows) continue;
     if (ends.on_ground)
       held_.push_back({k, ends.rows, {}});
@@ -72,6 +73,12 @@ void KnotJacobi::find_knots(const BlockGraph& A) {
 
 int KnotJacobi::factor(const BlockGraph& A) {
   find_knots(A);
+  std::erase_if(held_, [&](Held& knot) {
+    if (factor_held(A, knot)) return false;
+    for (int e = A.hub_begin[knot.hub]; e < A.hub_begin[knot.hub + 1]; ++e)
+      is_in_knot_[A.end_node[e]] = in_none;
+    return true;
+  });
   block_.resize(21 * static_cast<std::size_t>(A.n()));
   for (int i = 0; i < A.n(); ++i) {
     if (is_in_knot_[i] == in_held) continue;
@@ -84,8 +91,6 @@ int KnotJacobi::factor(const BlockGraph& A) {
   inner_.resize(21 * knots_.size());
   for (int at = 0; at < static_cast<int>(knots_.size()); ++at)
     if (!factor_knot(A, at)) return A.end_node[A.hub_begin[knots_[at]]];
-  for (Held& knot : held_)
-    if (!factor_held(A, knot)) return A.end_node[A.hub_begin[knot.hub]];
   return -1;
 }
 
@@ -119,7 +124,7 @@ bool KnotJacobi::factor_held(const BlockGraph& A, Held& knot) {
     for (int i = j; i < knot.rows; ++i)
       for (int c = 0; c < 6; ++c) knot.L[packed(i, j)] += levers[i][c] * y[c];
   }
-  return cholesky_factor(knot.rows, knot.L.data(), 0.0);
+  return cholesky_factor(knot.rows, knot.L.data(), repeated);
 }
 
 void KnotJacobi::solve_held(const BlockGraph& A, const Held& knot, std::span<double> z) const {
