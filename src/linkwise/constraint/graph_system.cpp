@@ -13,11 +13,11 @@ namespace linkwise {
 
 GraphSystem::GraphSystem(const Model& model)
     : model_(&model),
+      boxes_(model),
       state_(model.n_bodies()),
       general_(model.n_general),
       joint_(model.n_bodies()),
       loops_(model),
-      boxes_(model),
       g_(model.n_bodies()),
       known_(model.n_bodies()),
       known_of_loop_(model.n_loops()),
