@@ -59,6 +59,10 @@ def reduce(
     return _body(system, shapes, turn, at, damping, residual)
 
 
+#: How far nodes of a handle are off a line, over its length, that rounding in a file can explain.
+_ON_A_LINE = 1e-4
+
+
 @dataclass
 class _System:
     M: Any  # csr
@@ -177,8 +181,8 @@ def _shapes(
     """Columns of displacements (dofs, 6 + modes), the first six of the outboard handle."""
     held = {name: system.dofs(x) for name, x in rows.items()}
     for name, x in rows.items():
-        motions = system.rigid(system.r[x].mean(axis=0), x)
-        if system.per_node == 3 and np.linalg.matrix_rank(motions, tol=1e-9) < 6:
+        spread = np.linalg.svd(system.r[x] - system.r[x].mean(axis=0), compute_uv=False)
+        if system.per_node == 3 and (len(x) < 3 or spread[1] <= _ON_A_LINE * spread[0]):
             raise InputError(
                 f"nodes of handle '{name}' are on a line, which does not say how it turns; give "
                 "three or more that are not"

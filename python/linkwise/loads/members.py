@@ -138,7 +138,7 @@ def _along(
         list(found.values()),
         dim=dim,
         data_vars="all",
-        coords=[name for name in _MASKS if name in next(iter(found.values())).coords],
+        coords=_own_coordinates(list(found.values())),
         compat="override",
         join="outer",
         combine_attrs=_common_attrs,
@@ -148,6 +148,19 @@ def _along(
     return joined.assign_coords({dim: list(found)}).reindex(
         {dim: range(dataset.sizes[dim])}, fill_value=dict.fromkeys(_MASKS, False)
     )
+
+
+def _own_coordinates(parts: Sequence[Any]) -> list[str]:
+    """Coordinates of each member, such as places along links of other lengths."""
+    first = parts[0].coords
+    differ = (
+        name
+        for name in first
+        if first[name].dims
+        and name not in first[name].dims
+        and not all(name in p.coords and p.coords[name].equals(first[name]) for p in parts)
+    )
+    return list(dict.fromkeys([*(name for name in _MASKS if name in first), *map(str, differ)]))
 
 
 def _of_one(

@@ -491,7 +491,18 @@ def with_inertias(source: ScenarioSource, model: Model) -> Model:
             model = model.with_link(name, mass=link.mass, com=link.com, inertia=_tensor(link))
         except InputError as error:
             source.complain(("link", name), str(error), "correct its inertial data")
+    return _with_payloads(source, model, on_flexible=False)
+
+
+def with_payloads_on_flexible(source: ScenarioSource, model: Model) -> Model:
+    """Adds those on links that only making links flexible has made, such as `jib:end`."""
+    return _with_payloads(source, model, on_flexible=True)
+
+
+def _with_payloads(source: ScenarioSource, model: Model, *, on_flexible: bool) -> Model:
     for name, payload in source.settings.payload.items():
+        if (payload.link.rpartition(":")[0] in source.settings.flexible) != on_flexible:
+            continue
         keys = ("payload", name)
         _check_link(source, model, payload.link, (*keys, "link"))
         try:

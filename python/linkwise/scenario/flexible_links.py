@@ -19,36 +19,40 @@ def with_flexible_links(source: ScenarioSource, model: Model) -> Model:
         if name not in model.link_names:
             remedy = near(name, model.link_names, "the links are")
             source.complain(keys, f"the model has no link '{shorten(name)}'", remedy)
+        (_check_beams if link.file is None else _check_file)(source, link, keys)
         try:
             if link.file is not None:
-                model = model.with_flexible(name, body=_body(source, link, link.file, keys))
+                model = model.with_flexible(name, body=_body(source, link, link.file))
             else:
-                model = _with_beams(source, link, keys, model)
+                model = _with_beams(link, name, model)
         except InputError as error:
             problem, _, remedy = str(error).partition("; ")
             source.complain(keys, problem, remedy or "correct it")
     return model
 
 
-def _body(
-    source: ScenarioSource, link: FlexibleSection, file: str, keys: tuple[str, str]
-) -> FlexibleBody:
-    """The body of the file, with another damping where that is given."""
+def _check_file(source: ScenarioSource, link: FlexibleSection, keys: tuple[str, str]) -> None:
     for key in sorted(link.model_fields_set - {"file", _DAMPING}):
         source.complain(keys, f"{key} is given beside file, which has it", "leave it out")
+
+
+def _body(source: ScenarioSource, link: FlexibleSection, file: str) -> FlexibleBody:
+    """The body of the file, with another damping where that is given."""
     try:
         body = FlexibleBody.load(source.resolve(file))
     except OSError as error:
-        source.complain(keys, f"file cannot be read: {error.strerror}", "correct the path")
+        raise InputError(f"file cannot be read: {error.strerror}; correct the path") from None
     return body.with_damping(link.damping) if _DAMPING in link.model_fields_set else body
 
 
-def _with_beams(
-    source: ScenarioSource, link: FlexibleSection, keys: tuple[str, str], model: Model
-) -> Model:
+def _check_beams(source: ScenarioSource, link: FlexibleSection, keys: tuple[str, str]) -> None:
     for key in ("section", "E", "G"):
         if getattr(link, key) is None:
             source.complain(keys, f"{key} is missing", f"add {key} = ..., or file = FILE.npz")
+    changed = source.settings.link.get(keys[1])
+    if link.density is not None and changed is not None and changed.mass is not None:
+        problem = f"density is given beside mass in [link.{shorten(keys[1])}], which it replaces"
+        source.complain(keys, problem, "leave one of them out")
     assert link.section is not None
     needed = SHAPES[link.section]
     for size in sorted({size for sizes in SHAPES.values() for size in sizes}):
@@ -59,12 +63,16 @@ def _with_beams(
             text = f"a {link.section} section is given by {', '.join(needed)}"
             problem = f"{size} is {'given' if given else 'missing'}: {text}"
             source.complain(keys, problem, f"{'leave it out' if given else 'give it'}")
-    sizes = {size: getattr(link, size) for size in needed}
+
+
+def _with_beams(link: FlexibleSection, name: str, model: Model) -> Model:
+    assert link.section is not None
+    sizes = {size: getattr(link, size) for size in SHAPES[link.section]}
     if link.section == "general":
         sizes |= {size: getattr(link, size) or 0.0 for size in OUTSIDE}
     make = getattr(Section, link.section, Section)
     return model.with_flexible(
-        keys[1],
+        name,
         section=make(**sizes),
         E=link.E,
         G=link.G,

@@ -29,6 +29,7 @@ from linkwise.scenario.arguments import (
     key_path,
     with_inertias,
     with_loops,
+    with_payloads_on_flexible,
     with_properties,
 )
 from linkwise.scenario.flexible_links import with_flexible_links
@@ -66,7 +67,7 @@ class Scenario(ScenarioSource):
         with quiet():  # the scenario may cure what is wrong in the model's file
             bare = self._bare_model()
         model = with_flexible_links(self, with_inertias(self, with_loops(self, bare)))
-        model = with_properties(self, model)
+        model = with_properties(self, with_payloads_on_flexible(self, model))
         tell(warnings_of(model), reading=True)
         return model
 

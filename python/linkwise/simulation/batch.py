@@ -42,6 +42,10 @@ if TYPE_CHECKING:
 QUANTITIES = tuple(dict.fromkeys(row["group"] for row in TABLE if row["of_members"]))
 
 
+#: What members share; elastic joints of one type differ in how many coordinates they have.
+_ALIKE = ("joint_names", "joint_types", "joint_nq", "joint_nv")
+
+
 def _machines(model: Model | Sequence[Model]) -> list[Model]:
     """The models, alike in their joints."""
     if isinstance(model, str) or not isinstance(model, Iterable | Model):
@@ -50,7 +54,7 @@ def _machines(model: Model | Sequence[Model]) -> list[Model]:
     if not models or not all(isinstance(one, Model) for one in models):
         raise InputError("model: give a Model, or a sequence of at least one")
     for k, one in enumerate(models):
-        if one.joint_names != models[0].joint_names or one.joint_types != models[0].joint_types:
+        if any(getattr(one, name) != getattr(models[0], name) for name in _ALIKE):
             raise InputError(f"model: model[{k}] has other joints than model[0]; simulate it apart")
     return models
 

@@ -90,9 +90,19 @@ def check_driven(
         try:
             by_name[name] = _placed(as_wrench(wrench), frame)
             wrenched_bodies(model, {name: by_name[name]})
+            _check_start(model, by_name[name].at)
         except InputError as error:
             raise InputError(f"wrenches[{shown(name)}]: {error}") from None
     return by_joint, by_name
+
+
+def _check_start(model: Model, at: str | Frame | None) -> None:
+    """A wrench bends nothing of the body on whose frame it is."""
+    if isinstance(at, Frame) and at.link in model.flexible_links and at.origin.any():
+        raise InputError(
+            "acts on the frame of a flexible link, where that starts, and would not bend it; name "
+            f"'{at.link}:end', or one of its further beams, or let it act at the origin"
+        )
 
 
 def _placed(wrench: Wrench, frame: Any) -> Wrench:

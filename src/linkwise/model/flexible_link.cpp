@@ -55,10 +55,20 @@ std::optional<Vec3<double>> carried_at(const ModelSpec& spec, const Attached& on
   return end;
 }
 
+std::string point_text(const Vec3<double>& r) {
+  return "(" + number_text(r.x) + ", " + number_text(r.y) + ", " + number_text(r.z) + ")";
+}
+
 Vec3<double> end_of(const ModelSpec& spec, const Attached& on, const FlexibleLink& flexible,
                     const std::string& head) {
-  if (flexible.end) return *flexible.end;
-  const std::optional<Vec3<double>> end = carried_at(spec, on, flexible.link, head);
+  const std::optional<Vec3<double>> carried = carried_at(spec, on, flexible.link, head);
+  if (carried && flexible.end && length_of(*flexible.end) > 0 &&
+      length_of(*carried - *flexible.end) > 1e-6 * (1e-3 + length_of(*flexible.end)))
+    throw InputError(head + "carries joints at " + point_text(*carried) + ", and its end is at " +
+                     point_text(*flexible.end) +
+                     " in the link's frame; let the joints be there, and put payloads on '" +
+                     flexible.link + ":end'");
+  const std::optional<Vec3<double>> end = flexible.end ? flexible.end : carried;
   if (!end)
     throw InputError(head +
                      "carries no joint that would say where it ends; give end, a point in "
@@ -73,7 +83,8 @@ Mat3<double> beam_axes(const FlexibleLink& flexible, const Vec3<double>& end,
   Vec3<double> z = flexible.z.value_or(Vec3<double>{0, 0, 1});
   if (flexible.z && !(length_of(cross(z, x)) > 1e-6 * length_of(z)))
     throw InputError(head + "z is along the beam or zero; give a direction across it");
-  if (!(length_of(cross(z, x)) > 1e-6)) z = {1, 0, 0};
+  // Well apart from where rounding of a model's angles could choose.
+  if (!flexible.z && !(length_of(cross(z, x)) > 0.02)) z = {1, 0, 0};
   z = z - dot(z, x) * x;
   z = (1 / length_of(z)) * z;
   const Vec3<double> y = cross(z, x);
@@ -194,14 +205,11 @@ Sym3<double> about_centre(const Inertia<double>& M, const Vec3<double>& c) {
   return I;
 }
 
-std::string point_text(const Vec3<double>& r) {
-  return "(" + number_text(r.x) + ", " + number_text(r.y) + ", " + number_text(r.z) + ")";
-}
-
 }  // namespace
 
 FlexibleLinks::FlexibleLinks(ModelSpec& spec) : spec_(spec) {
   for (size_t i = 0; i < spec.links.size(); ++i) link_.try_emplace(spec.links[i].name, i);
+  for (const JointSpec& joint : spec.joints) moved_.insert(joint.child);
   for (size_t j = 0; j < spec.joints.size(); ++j)
     attached_[spec.joints[j].parent].joints.push_back(static_cast<int>(j));
   for (size_t l = 0; l < spec.loop_joints.size(); ++l) {
@@ -221,6 +229,13 @@ LinkSpec& FlexibleLinks::rigid_link(const std::string& name, const std::string& 
   LinkSpec& link = spec_.links[found->second];
   if (link.body_kind != BodyKind::rigid)
     throw InputError(head + "is flexible already; make it so once");
+  if (!spec_.floating_base && !moved_.contains(name))
+    throw InputError(head +
+                     "no joint moves it, it is the ground; let a fixed joint hold it on another "
+                     "link, or the base float");
+  for (const std::string& beam : {name + ":2", name + ":end"})
+    if (link_.contains(beam))
+      throw InputError(head + "link '" + beam + "' has the name of a part of it; rename that link");
   return link;
 }
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "linkwise/model/spec.hpp"
@@ -56,6 +57,7 @@ class FlexibleLinks {
   ModelSpec& spec_;
   std::unordered_map<std::string, size_t> link_;
   std::unordered_map<std::string, Attached> attached_;
+  std::unordered_set<std::string> moved_;  ///< links that are children of joints
 };
 
 /// Of one link: FlexibleLinks::add.

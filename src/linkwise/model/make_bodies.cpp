@@ -121,6 +121,10 @@ void place_ports(const Machine& machine, const BodyTree& tree, PlacedJoints& pla
     if (element.kind != ElementKind::elastic) continue;
     const int b = out.topology[c].parent;
     const JointInfo& joint = placed.joints[joints_of(tree, static_cast<int>(c)).front()];
+    if (b < 0)
+      throw InputError("joint '" + joint.name + "'" + machine.where +
+                       ": hangs on the ground, which bends nowhere; hold the flexible link by a "
+                       "fixed joint on another link");
     BodyKinds::dispatch(out.topology[b].body_kind, [&](auto kind) {
       using B = typename decltype(kind)::Body;
       if constexpr (has_coordinates<B>)
