@@ -47,7 +47,7 @@ OTHERWISE = {
     *("Report", "Spectrum", "Run"),
     *("Progress", "InputError", "NumericsError", "SimulationError", "SimulationInterrupted"),
     *("ModelWarning", "Drive", "Free", "Locked", "ConstraintSystem", "DynamicsMethod", "Frame"),
-    *("Model", "ModelBuilder", "Indeterminacy", "Assembly", "Section"),
+    *("Model", "ModelBuilder", "Indeterminacy", "Assembly", "Section", "FlexibleBody", "flexible"),
 }
 
 

@@ -302,7 +302,10 @@ Outcome Esdirk::step(double t_limit) {
 bool Esdirk::hides_a_kink(double t) {
   const double tolerance =
       options_.relative_tolerance > 0.0 ? options_.relative_tolerance : options_.tolerance;
-  if (!(history_.contradiction(system_) > most_contradiction * tolerance)) return false;
+  // Late in time the length of a short step is known to few digits.
+  const double blur = std::numeric_limits<double>::epsilon() * std::abs(t) / (t - time_);
+  if (!(history_.contradiction(system_) > most_contradiction * std::max(tolerance, blur)))
+    return false;
   const double shorter = 0.25 * (t - time_);
   if (!moved_to(time_ + shorter)) return false;
   history_.drop_last();
