@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,16 +30,19 @@ class Rating:
     drive_power: float | None = None
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if value is None:
-                continue
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-                raise InputError(
-                    f"rating {field.name}: {shown(value)} is not a number; give one in SI"
-                )
-            if not (np.isfinite(value) and value > 0):
-                raise InputError(f"rating {field.name}: is {value:g}; give a positive number in SI")
+        check_rating(self)
+
+
+def check_rating(rating: Any) -> None:
+    """Refuses what is no positive number among the fields of a rating, joint's or section's."""
+    for field in fields(rating):
+        value = getattr(rating, field.name)
+        if value is None:
+            continue
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+            raise InputError(f"rating {field.name}: {shown(value)} is not a number; give one in SI")
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"rating {field.name}: is {value:g}; give a positive number in SI")
 
 
 def rating_table(

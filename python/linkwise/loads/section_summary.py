@@ -13,6 +13,7 @@ from linkwise.base import COMPONENTS, Array
 from linkwise.io.complaint import near, shown
 from linkwise.loads.fatigue import EXPONENTS, checked_exponents, checked_repetitions, ranges_of
 from linkwise.loads.members import each_member
+from linkwise.loads.rating import check_rating
 from linkwise.loads.sections import Sections, extreme_stress, fibres, stress_at
 
 if TYPE_CHECKING:
@@ -194,16 +195,7 @@ class SectionRating:
     nz: float | None = None
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if value is None:
-                continue
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-                raise InputError(
-                    f"rating {field.name}: {shown(value)} is not a number; give one in SI"
-                )
-            if not (np.isfinite(value) and value > 0):
-                raise InputError(f"rating {field.name}: is {value:g}; give a positive number in SI")
+        check_rating(self)
 
 
 def section_margins(summary: xr.Dataset, rating: SectionRating) -> xr.Dataset:
