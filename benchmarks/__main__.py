@@ -15,6 +15,7 @@ STUDIES = (
     "huge_chains",
     "million_links",
     "closed_loops",
+    "elastic_links",
     "iterations",
     "stop_tests",
     "stiff_machines",
